@@ -1,0 +1,2 @@
+//! Firmware.
+#![cfg_attr(not(test), no_std)]

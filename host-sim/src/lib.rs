@@ -1,0 +1,5 @@
+//! Everything that runs on the PC: plant, weather, sensors, trajectories, closed-loop flights, training,
+//! design of the feedback lane, experiments, reports and the command line.
+//!
+//! SI units; world frame ENU (z up), body frame FLU, Hamilton quaternion body to world; f64 here, f32 in the firmware.
+

@@ -1,0 +1,2 @@
+//! Model export.
+fn main() {}

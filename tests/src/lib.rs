@@ -1,0 +1,1 @@
+//! The promises of the project live in `tests/`; this library is empty.
