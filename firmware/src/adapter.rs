@@ -1,0 +1,309 @@
+//! The add-on: corrects the references of any stable loop.
+//!
+//! *in* desired channels (pushed ahead of time) and measured channels, at every reference tick; *out* the reference channels;
+//! *never* a correction beyond the model's limits and slew, never any change of the desired reference when both lanes are off;
+//! *source* Zhou 2017, Fig. 1. What differs: the correction is ramped between sub-rate ticks, and a feedback lane adds to it.
+
+use crate::{
+    features::{self, Signals},
+    feedback::AxisState,
+    math::{clamp, finite_or_zero},
+    model::{Card, Interpolation, MAX_AXES, MAX_ERRORS, MAX_FEATURES, MAX_OUTPUTS, Model, Refusal, SignalTable},
+    network::Scratch,
+    preview::{EndRule, Preview},
+};
+
+/// Sub-rate ticks of measured and reference history that features can read.
+pub const HISTORY: usize = 16;
+
+/// Which lanes act.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Lanes {
+    /// The network lane.
+    pub network: bool,
+    /// The feedback lane.
+    pub feedback: bool,
+}
+
+impl Lanes {
+    /// Both lanes.
+    pub const BOTH: Self = Self { network: true, feedback: true };
+    /// No lane: the loop gets the desired reference, to the bit.
+    pub const NONE: Self = Self { network: false, feedback: false };
+}
+
+/// Values at sub-rate ticks; what is older or newer than stored gives the nearest.
+type History<const C: usize> = Preview<C, HISTORY>;
+
+/// What the features of one inference see.
+struct View<'a, const D: usize, const M: usize, const R: usize, const N: usize> {
+    desired: &'a Preview<D, N>,
+    measured: &'a History<M>,
+    references: &'a History<R>,
+    divisor: i32,
+}
+
+impl<const D: usize, const M: usize, const R: usize, const N: usize> Signals for View<'_, D, M, R, N> {
+    #[inline]
+    fn desired(&self, tick: i32, channel: usize) -> f32 {
+        self.desired.channel(tick, channel)
+    }
+    #[inline]
+    fn measured(&self, tick: i32, channel: usize) -> f32 {
+        self.measured.channel(tick.div_euclid(self.divisor), channel)
+    }
+    #[inline]
+    fn reference(&self, tick: i32, channel: usize) -> f32 {
+        self.references.channel(tick.div_euclid(self.divisor), channel)
+    }
+}
+
+/// Adapter for a loop with `D` desired, `M` measured and `R` reference channels.
+#[derive(Debug)]
+pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
+    model: &'m Model<'m>,
+    /// Desired channel from which each reference channel starts.
+    base: [usize; R],
+    measured: History<M>,
+    references: History<R>,
+    /// Network correction at the last and at the next sub-rate tick.
+    ramp: [[f32; MAX_OUTPUTS]; 2],
+    primed: bool,
+    axes: [AxisState; MAX_AXES],
+    lanes: Lanes,
+    /// How far each lane is faded in, 0..=1.
+    network_weight: f32,
+    feedback_weight: f32,
+    correction: [f32; MAX_OUTPUTS],
+    saturations: u32,
+    scratch: Scratch,
+}
+
+impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
+    /// Ties a model to an application whose signals are `table`, whose references run at `rate_hz` and whose preview keeps
+    /// `capacity` samples. Both lanes are off.
+    ///
+    /// # Errors
+    /// If signals, rate or preview length do not fit.
+    pub fn new(model: &'m Model<'m>, table: &SignalTable<'_>, rate_hz: f32, capacity: usize) -> Result<Self, Refusal> {
+        let card = model.card();
+        same_signals(card, table, [D, M, R])?;
+        let rate = card.timing.reference_rate_hz;
+        if (rate - rate_hz).abs() > 1e-3 * rate_hz {
+            return Err(Refusal::Rate { model: rate, application: rate_hz });
+        }
+        let (past, future) = card.preview_span();
+        if past + future + 1 > capacity as u32 {
+            return Err(Refusal::Preview { needed: past + future + 1, available: capacity as u32 });
+        }
+        Ok(Self {
+            model,
+            base: base_channels(table),
+            measured: History::new([EndRule::Hold; M], 0),
+            references: History::new([EndRule::Hold; R], 0),
+            ramp: [[0.0; MAX_OUTPUTS]; 2],
+            primed: false,
+            axes: [AxisState::REST; MAX_AXES],
+            lanes: Lanes::NONE,
+            network_weight: 0.0,
+            feedback_weight: 0.0,
+            correction: [0.0; MAX_OUTPUTS],
+            saturations: 0,
+            scratch: Scratch::new(),
+        })
+    }
+
+    /// The model that is flown.
+    pub fn model(&self) -> &'m Model<'m> {
+        self.model
+    }
+
+    /// Switches lanes; they are faded in and out over the model's fade time.
+    pub fn switch(&mut self, lanes: Lanes) {
+        self.lanes = lanes;
+    }
+
+    /// Correction of each output of the model in the last tick.
+    pub fn correction(&self) -> &[f32; MAX_OUTPUTS] {
+        &self.correction
+    }
+
+    /// Ticks in which a limit or the slew bounded the correction.
+    pub fn saturations(&self) -> u32 {
+        self.saturations
+    }
+
+    /// One reference tick: the reference that the loop shall track. `preview` should reach [`Card::preview_span`]'s future ahead;
+    /// what is missing is taken as the trajectory's end.
+    pub fn step<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M]) -> [f32; R] {
+        let desired = preview.sample(tick);
+        let mut reference = self.base.map(|channel| desired.get(channel).copied().unwrap_or(0.0));
+        self.fade();
+        let network = self.network(tick, preview, measured);
+        let feedback = self.feedback(tick, preview, measured);
+        if self.network_weight > 0.0 || self.feedback_weight > 0.0 {
+            self.apply(&mut reference, &network, &feedback);
+        } else {
+            // Not even an addition of zero: the baseline's bits.
+            self.correction = [0.0; MAX_OUTPUTS];
+            self.settle(&[0.0; MAX_AXES]);
+        }
+        let divisor = i32::from(self.model.card().timing.divisor);
+        if tick.rem_euclid(divisor) == 0 {
+            self.references.push(reference);
+        }
+        reference
+    }
+
+    fn fade(&mut self) {
+        let ticks = self.model.card().timing.fade_ticks;
+        let step = if ticks == 0 { 1.0 } else { 1.0 / f32::from(ticks) };
+        let approach = |weight: f32, on: bool| clamp(if on { weight + step } else { weight - step }, 0.0, 1.0);
+        self.network_weight = approach(self.network_weight, self.lanes.network && self.model.network().is_some());
+        self.feedback_weight = approach(self.feedback_weight, self.lanes.feedback && self.model.lane().is_some());
+    }
+
+    /// The network lane's correction at this tick.
+    fn network<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M]) -> [f32; MAX_OUTPUTS] {
+        let timing = self.model.card().timing;
+        let divisor = i32::from(timing.divisor);
+        let phase = tick.rem_euclid(divisor);
+        if phase == 0 {
+            self.align(tick.div_euclid(divisor), measured);
+            if self.lanes.network || self.network_weight > 0.0 {
+                let [start, end] = &mut self.ramp;
+                *start = *end;
+                match timing.interpolation {
+                    Interpolation::Hold => self.ramp[0] = self.infer(tick, preview),
+                    Interpolation::Linear => {
+                        if !self.primed {
+                            self.ramp[0] = self.infer(tick, preview);
+                        }
+                        self.ramp[1] = self.infer(tick.wrapping_add(divisor), preview);
+                    }
+                }
+                self.primed = true;
+            } else {
+                self.primed = false;
+            }
+        }
+        if !self.primed {
+            return [0.0; MAX_OUTPUTS];
+        }
+        let [start, end] = &self.ramp;
+        match timing.interpolation {
+            Interpolation::Hold => *start,
+            Interpolation::Linear => {
+                let share = phase as f32 / divisor as f32;
+                core::array::from_fn(|i| start[i] + (end[i] - start[i]) * share)
+            }
+        }
+    }
+
+    /// Stores the measured channels of sub-rate tick `sub_tick`; histories start with the first tick that is seen.
+    fn align(&mut self, sub_tick: i32, measured: &[f32; M]) {
+        if self.measured.next_tick() != sub_tick {
+            self.measured = History::new([EndRule::Hold; M], sub_tick);
+            self.references = History::new([EndRule::Hold; R], sub_tick);
+        }
+        self.measured.push(measured.map(finite_or_zero));
+    }
+
+    /// Evaluates the network for the sub-rate tick that falls on reference tick `target`.
+    fn infer<const N: usize>(&mut self, target: i32, preview: &Preview<D, N>) -> [f32; MAX_OUTPUTS] {
+        let mut outputs = [0.0; MAX_OUTPUTS];
+        let Some(network) = self.model.network() else { return outputs };
+        let card = self.model.card();
+        let divisor = i32::from(card.timing.divisor);
+        let view = View { desired: preview, measured: &self.measured, references: &self.references, divisor };
+        let mut inputs = [0.0; MAX_FEATURES];
+        features::evaluate(&card.features, &view, target, divisor, &mut inputs);
+        network.evaluate(&inputs, &mut outputs, &mut self.scratch);
+        outputs.map(finite_or_zero)
+    }
+
+    /// The feedback lane's output on each of its axes.
+    fn feedback<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M]) -> [f32; MAX_AXES] {
+        let mut outputs = [0.0; MAX_AXES];
+        let Some(lane) = self.model.lane() else { return outputs };
+        let timing = &self.model.card().timing;
+        let dt = 1.0 / timing.reference_rate_hz;
+        let whole = timing.measurement_delay_ticks as i32;
+        let share = timing.measurement_delay_ticks - whole as f32;
+        let engaged = self.lanes.feedback && self.feedback_weight > 0.0;
+        for ((axis, state), output) in lane.axes().iter().zip(&mut self.axes).zip(&mut outputs) {
+            let mut errors = [0.0; MAX_ERRORS];
+            for (error, &(measured_channel, desired_channel)) in errors.iter_mut().zip(&axis.layout().errors) {
+                let channel = usize::from(desired_channel);
+                let newer = preview.channel(tick - whole, channel);
+                let older = preview.channel(tick - whole - 1, channel);
+                let then = newer + (older - newer) * share;
+                *error = measured.get(usize::from(measured_channel)).copied().unwrap_or(then) - then;
+            }
+            *output = state.step(lane, axis, errors, dt, engaged);
+        }
+        outputs
+    }
+
+    /// Adds both lanes within limits and slew, and tells the feedback lane what was applied of it.
+    fn apply(&mut self, reference: &mut [f32; R], network: &[f32; MAX_OUTPUTS], feedback: &[f32; MAX_AXES]) {
+        let card = self.model.card();
+        let mut wanted = network.map(|value| value * self.network_weight);
+        let axes = card.lane.iter().flat_map(|lane| &lane.axes);
+        for (axis, value) in axes.clone().zip(feedback) {
+            if let Some(wanted) = wanted.get_mut(usize::from(axis.output)) {
+                *wanted += value * self.feedback_weight;
+            }
+        }
+        let mut excess = [0.0; MAX_OUTPUTS];
+        let mut saturated = false;
+        let places = self.correction.iter_mut().zip(&wanted).zip(&mut excess);
+        for (output, ((correction, &wanted), excess)) in card.outputs.iter().zip(places) {
+            let slewed = clamp(wanted, *correction - output.slew, *correction + output.slew);
+            *correction = clamp(slewed, -output.limit, output.limit);
+            *excess = *correction - wanted;
+            saturated |= *excess != 0.0;
+            if let Some(channel) = reference.get_mut(usize::from(output.channel)) {
+                *channel += *correction;
+            }
+        }
+        self.saturations = self.saturations.saturating_add(u32::from(saturated));
+        let mut applied = [0.0; MAX_AXES];
+        for ((axis, value), applied) in axes.zip(feedback).zip(&mut applied) {
+            *applied = value * self.feedback_weight + excess.get(usize::from(axis.output)).copied().unwrap_or(0.0);
+        }
+        self.settle(&applied);
+    }
+
+    fn settle(&mut self, applied: &[f32; MAX_AXES]) {
+        if let Some(lane) = self.model.lane() {
+            for (state, &value) in self.axes.iter_mut().zip(applied).take(lane.axes().len()) {
+                state.applied(lane, value);
+            }
+        }
+    }
+}
+
+/// Desired channel of the same name for each reference channel.
+pub fn base_channels<const R: usize>(table: &SignalTable<'_>) -> [usize; R] {
+    core::array::from_fn(|r| {
+        let name = table.reference.get(r).map(|channel| channel.name);
+        table.desired.iter().position(|desired| Some(desired.name) == name).unwrap_or(0)
+    })
+}
+
+fn same_signals(card: &Card<'_>, table: &SignalTable<'_>, counts: [usize; 3]) -> Result<(), Refusal> {
+    let pairs = [
+        ("desired", &card.signals.desired, &table.desired),
+        ("measured", &card.signals.measured, &table.measured),
+        ("reference", &card.signals.reference, &table.reference),
+    ];
+    for ((signal, model, application), count) in pairs.into_iter().zip(counts) {
+        let differs = model.iter().zip(application).position(|(a, b)| a != b);
+        let length = (model.len() != application.len() || model.len() != count).then_some(model.len().min(count));
+        if let Some(channel) = differs.or(length) {
+            return Err(Refusal::Signal { signal, channel: channel as u8 });
+        }
+    }
+    Ok(())
+}

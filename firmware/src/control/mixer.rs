@@ -1,0 +1,42 @@
+//! Mixer: thrust and moment to rotor speeds.
+
+use nalgebra::{Matrix4, Vector3, Vector4};
+
+use super::Airframe;
+use crate::{math, types::MotorCommand};
+
+/// Inverse of the map from rotor thrusts to collective thrust and moment.
+#[derive(Clone, Debug)]
+pub struct Mixer {
+    inverse: Matrix4<f32>,
+    /// Squared speed fraction for a rotor thrust of 1 N.
+    fraction_squared: f32,
+}
+
+impl Mixer {
+    /// Mixer of an airframe; `None` if its rotors cannot produce every moment.
+    pub fn new(airframe: &Airframe) -> Option<Self> {
+        let ratio = airframe.torque_coefficient / airframe.thrust_coefficient;
+        let columns: [Vector4<f32>; 4] = core::array::from_fn(|rotor| {
+            let [x, y] = airframe.rotors[rotor];
+            Vector4::new(1.0, y, -x, airframe.directions[rotor] * ratio)
+        });
+        let largest = airframe.thrust_coefficient * airframe.max_rotor_speed * airframe.max_rotor_speed;
+        let inverse = Matrix4::from_columns(&columns).try_inverse()?;
+        let fraction_squared = 1.0 / largest;
+        (inverse.iter().all(|x| x.is_finite()) && fraction_squared.is_finite()).then_some(Self { inverse, fraction_squared })
+    }
+
+    /// Thrust of each rotor, N, before any limit.
+    pub fn rotor_thrusts(&self, thrust: f32, moment: &Vector3<f32>) -> [f32; 4] {
+        (self.inverse * Vector4::new(thrust, moment.x, moment.y, moment.z)).into()
+    }
+
+    /// Rotor speeds for a collective thrust, N, and a moment, N m. Thrusts that a rotor cannot give are clipped.
+    pub fn mix(&self, thrust: f32, moment: &Vector3<f32>) -> MotorCommand {
+        MotorCommand::saturated(self.rotor_thrusts(thrust, moment).map(|force| {
+            let squared = force * self.fraction_squared;
+            if squared > 0.0 { math::sqrt(squared) } else { 0.0 }
+        }))
+    }
+}

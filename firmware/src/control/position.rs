@@ -1,0 +1,95 @@
+//! Position loop.
+
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::GRAVITY;
+use crate::{
+    math::{self, clamp},
+    types::{Reference, State},
+};
+
+/// Gains of the position loop, for each axis of the world frame.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PositionGains {
+    /// Position error to acceleration, 1/s².
+    pub kp: [f32; 3],
+    /// Velocity error to acceleration, 1/s.
+    pub kd: [f32; 3],
+    /// Integrated position error to acceleration, 1/s³; 0 switches the integral off.
+    pub ki: [f32; 3],
+    /// Largest acceleration that the integral may ask for, m/s².
+    pub integral_limit: f32,
+}
+
+/// What the attitude loop shall realise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ThrustVector {
+    /// Force, world ENU, N.
+    pub force: Vector3<f32>,
+    /// Attitude whose z axis is along the force and whose heading is the reference's yaw; columns are body axes in the world.
+    pub attitude: Matrix3<f32>,
+}
+
+/// Position loop with its integral.
+#[derive(Clone, Debug)]
+pub struct PositionLoop {
+    gains: PositionGains,
+    mass: f32,
+    dt: f32,
+    integral: Vector3<f32>,
+    yaw: f32,
+    heading: Vector3<f32>,
+    attitude: Matrix3<f32>,
+}
+
+impl PositionLoop {
+    /// A loop at `rate_hz` for a vehicle of `mass` kg.
+    pub fn new(gains: PositionGains, mass: f32, rate_hz: f32) -> Self {
+        Self {
+            gains,
+            mass,
+            dt: 1.0 / rate_hz,
+            integral: Vector3::zeros(),
+            yaw: 0.0,
+            heading: Vector3::x(),
+            attitude: Matrix3::identity(),
+        }
+    }
+
+    /// Nonlinear transformation: the acceleration that PD (and integral) ask for, plus gravity, as a thrust vector.
+    pub fn step(&mut self, reference: &Reference, state: &State) -> ThrustVector {
+        let position_error = reference.position - state.position;
+        let velocity_error = reference.velocity - state.velocity;
+        let mut acceleration = Vector3::new(0.0, 0.0, GRAVITY);
+        let limit = self.gains.integral_limit;
+        for axis in 0..3 {
+            let step = self.gains.ki[axis] * position_error[axis] * self.dt;
+            self.integral[axis] = clamp(self.integral[axis] + step, -limit, limit);
+            acceleration[axis] +=
+                self.gains.kp[axis] * position_error[axis] + self.gains.kd[axis] * velocity_error[axis] + self.integral[axis];
+        }
+        if reference.yaw.to_bits() != self.yaw.to_bits() {
+            // Sine and cosine cost more than the rest of the loop on the target, and yaw mostly stands still.
+            self.yaw = reference.yaw;
+            self.heading = Vector3::new(math::cos(self.yaw), math::sin(self.yaw), 0.0);
+        }
+        let force = acceleration * self.mass;
+        if let Some(attitude) = aligned(&force, &self.heading) {
+            self.attitude = attitude;
+        }
+        ThrustVector { force, attitude: self.attitude }
+    }
+}
+
+/// Attitude whose third axis is along `force`; `None` if that is undefined (free fall, or force along the heading).
+fn aligned(force: &Vector3<f32>, heading: &Vector3<f32>) -> Option<Matrix3<f32>> {
+    let z = unit(force)?;
+    let y = unit(&z.cross(heading))?;
+    Some(Matrix3::from_columns(&[y.cross(&z), y, z]))
+}
+
+fn unit(vector: &Vector3<f32>) -> Option<Vector3<f32>> {
+    let length = math::sqrt(vector.dot(vector));
+    (length > 1e-6).then(|| vector * (1.0 / length))
+}

@@ -1,0 +1,170 @@
+//! Feedback lane: a stored linear map over lagged tracking errors and the lane's own past outputs, plus an integral.
+//!
+//! *in* tracking errors, each measured against what was desired at the time of the measurement, at the reference's own rate;
+//! *out* a bounded correction for each axis; *never* more than the two clamps added, whatever comes in;
+//! *source* linear-quadratic gain on an ARX model of the closed loop whose past inputs and outputs are its state. What differs: the
+//! integral's share is split off in its steady state, so that fast and slow part can be clamped apart.
+
+use heapless::Vec;
+
+use crate::{
+    math::{abs, clamp, finite_or_zero},
+    model::{Blob, Floats, LaneAxis, LaneLayout, MAX_AXES, MAX_ERRORS, MAX_LAGS, Refusal},
+};
+
+/// Length of the standard error sequence of the lane's probe, ticks.
+pub const PROBE_TICKS: u32 = 64;
+
+/// One checked axis.
+#[derive(Debug)]
+pub struct Axis<'a> {
+    layout: LaneAxis,
+    errors: Floats<'a>,
+    outputs: Floats<'a>,
+    /// Steady-state value of the output for an integral of 1.
+    slow_gain: f32,
+}
+
+/// A feedback lane whose shapes and values have been checked.
+#[derive(Debug)]
+pub struct Lane<'a> {
+    lags: usize,
+    axes: Vec<Axis<'a>, MAX_AXES>,
+}
+
+impl<'a> Lane<'a> {
+    pub(crate) fn new(layout: &LaneLayout, blob: &Blob<'a>) -> Result<Self, Refusal> {
+        let lags = usize::from(layout.lags);
+        let mut axes = Vec::new();
+        for axis in &layout.axes {
+            let count = axis.errors.len() * lags;
+            let coefficients = blob.floats(axis.coefficients, count + lags, "lane coefficients")?;
+            let (errors, outputs) = coefficients.split_at(count);
+            // With a constant output s and no error, s = sum(c) s + integral share: the share's steady state.
+            let denominator = 1.0 - outputs.iter().sum::<f32>();
+            let slow_gain = axis.integral / denominator;
+            if !(denominator > 1e-3 && slow_gain.is_finite()) {
+                return Err(Refusal::Value { what: "sum of the lane's past-output coefficients" });
+            }
+            let _ = axes.push(Axis { layout: axis.clone(), errors, outputs, slow_gain });
+        }
+        Ok(Self { lags, axes })
+    }
+
+    /// The axes in the order of the model's layout.
+    pub fn axes(&self) -> &[Axis<'a>] {
+        &self.axes
+    }
+
+    /// Multiplications in one tick.
+    pub fn multiply_adds(&self) -> u32 {
+        self.axes.iter().map(|axis| (axis.errors.len() + axis.outputs.len() + 1) as u32).sum()
+    }
+}
+
+impl Axis<'_> {
+    /// Index of the corrected output, and the errors' (measured, desired) channels.
+    pub fn layout(&self) -> &LaneAxis {
+        &self.layout
+    }
+}
+
+/// Memory of one axis: newest first.
+#[derive(Clone, Copy, Debug)]
+pub struct AxisState {
+    errors: [[f32; MAX_LAGS]; MAX_ERRORS],
+    outputs: [f32; MAX_LAGS],
+    integral: f32,
+    clamped: bool,
+}
+
+impl AxisState {
+    /// At rest.
+    pub const REST: Self =
+        Self { errors: [[0.0; MAX_LAGS]; MAX_ERRORS], outputs: [0.0; MAX_LAGS], integral: 0.0, clamped: false };
+
+    /// Whether the fast part was at its clamp in the last tick.
+    pub fn clamped(&self) -> bool {
+        self.clamped
+    }
+
+    /// Takes this tick's errors (in the order of the layout) and returns the lane's output on this axis.
+    /// `dt` is the reference's period, s. While not `engaged` the lags stay warm, the integral is zero and the output is not used.
+    pub fn step(&mut self, lane: &Lane<'_>, axis: &Axis<'_>, errors: [f32; MAX_ERRORS], dt: f32, engaged: bool) -> f32 {
+        let lags = lane.lags;
+        for (lagged, error) in self.errors.iter_mut().zip(errors) {
+            push(lagged, lags, finite_or_zero(error));
+        }
+        if !engaged {
+            self.integral = 0.0;
+        }
+        let layout = &axis.layout;
+        let slow = clamp(axis.slow_gain * self.integral, -layout.integral_limit, layout.integral_limit);
+        let mut fast = 0.0;
+        let mut coefficients = axis.errors;
+        for lagged in self.errors.iter().take(layout.errors.len()) {
+            let (these, rest) = coefficients.split_at(lags);
+            coefficients = rest;
+            fast += dot(these, lagged, 0.0);
+        }
+        fast += dot(axis.outputs, &self.outputs, slow);
+        let bounded = clamp(fast, -layout.fast_limit, layout.fast_limit);
+        self.clamped = bounded != fast;
+        let increment = self.errors[0][0] * dt;
+        let pushes_on = increment * axis.slow_gain;
+        let winds_up = (self.clamped && pushes_on * fast > 0.0)
+            || (abs(axis.slow_gain * (self.integral + increment)) > layout.integral_limit && pushes_on * slow > 0.0);
+        if engaged && !winds_up {
+            self.integral += increment;
+        }
+        finite_or_zero(bounded) + slow
+    }
+
+    /// Tells the axis what was really applied of its output.
+    pub fn applied(&mut self, lane: &Lane<'_>, value: f32) {
+        push(&mut self.outputs, lane.lags, value);
+    }
+}
+
+/// Shifts by one and stores the newest value in front.
+#[inline]
+fn push(lagged: &mut [f32; MAX_LAGS], lags: usize, newest: f32) {
+    if let Some(used) = lagged.get_mut(..lags) {
+        used.rotate_right(1);
+    }
+    lagged[0] = newest;
+}
+
+/// Σ c·(x - offset) in four interleaved sums: the same order on every machine, and not one long chain of additions.
+#[inline]
+fn dot(coefficients: Floats<'_>, values: &[f32; MAX_LAGS], offset: f32) -> f32 {
+    let mut sums = [0.0f32; 4];
+    let blocks = coefficients.blocks::<4>();
+    let whole = blocks.len() * 4;
+    for (block, values) in blocks.zip(values.as_chunks::<4>().0) {
+        for ((sum, coefficient), value) in sums.iter_mut().zip(block).zip(values) {
+            *sum += coefficient * (value - offset);
+        }
+    }
+    let tail = coefficients.iter().zip(values).skip(whole);
+    let rest = tail.fold(0.0, |sum, (coefficient, value)| sum + coefficient * (value - offset));
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+}
+
+/// The lane's output on each axis after [`PROBE_TICKS`] ticks of a fixed pseudo-random error sequence of ±1 cm.
+pub fn probe(lane: &Lane<'_>, dt: f32) -> [f32; MAX_AXES] {
+    let mut noise = 1u32;
+    let mut draw = || {
+        noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        ((noise >> 16) as f32 - 32_768.0) * (0.01 / 32_768.0)
+    };
+    let mut results = [0.0; MAX_AXES];
+    for (axis, result) in lane.axes.iter().zip(&mut results) {
+        let mut state = AxisState::REST;
+        for _ in 0..PROBE_TICKS {
+            *result = state.step(lane, axis, core::array::from_fn(|_| draw()), dt, true);
+            state.applied(lane, *result);
+        }
+    }
+    results
+}

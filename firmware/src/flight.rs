@@ -1,0 +1,141 @@
+//! The flight stack: a value in, a value out, time is an argument.
+//!
+//! *in* the state at every control tick and the desired trajectory ahead of time; *out* a motor command; *never* an allocation, a panic,
+//! a global, or a clock of its own; *source* the loop of Zhou 2017, Fig. 1, with the rates of [`Rates`].
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    adapter::{Adapter, Lanes},
+    control::{Airframe, AttitudeGains, AttitudeLoop, Mixer, PositionGains, PositionLoop, ThrustVector},
+    model::{Model, Refusal},
+    preview::Preview,
+    quadrotor::{self, DESIRED, MEASURED, REFERENCE},
+    types::{MotorCommand, Reference, Setpoint, State, Tick},
+};
+
+/// Samples of the desired trajectory that the flight stack keeps: 1.6 s at 100 Hz.
+pub const PREVIEW: usize = 160;
+
+/// Rates of the loops.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Rates {
+    /// Control ticks (attitude loop) a second.
+    pub control_hz: f32,
+    /// Control ticks in a tick of the position loop, which is the reference's tick.
+    pub position_divisor: u32,
+}
+
+impl Default for Rates {
+    /// 500 Hz and 100 Hz, as the Crazyflie's firmware runs its attitude and position loops.
+    fn default() -> Self {
+        Self { control_hz: 500.0, position_divisor: 5 }
+    }
+}
+
+impl Rates {
+    /// Rate of the position loop and so of the reference, Hz.
+    pub fn reference_hz(&self) -> f32 {
+        self.control_hz / self.position_divisor.max(1) as f32
+    }
+}
+
+/// Settings of the flight stack.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// Vehicle constants.
+    pub airframe: Airframe,
+    /// Position loop.
+    pub position: PositionGains,
+    /// Attitude loop.
+    pub attitude: AttitudeGains,
+    /// Rates.
+    pub rates: Rates,
+}
+
+/// The adapter of the flight stack.
+pub type QuadrotorAdapter<'m> = Adapter<'m, DESIRED, MEASURED, REFERENCE>;
+
+/// The baseline loop with, if a model is given, the add-on before it.
+#[derive(Debug)]
+pub struct Flight<'m> {
+    position_divisor: u32,
+    preview: Preview<DESIRED, PREVIEW>,
+    adapter: Option<QuadrotorAdapter<'m>>,
+    position: PositionLoop,
+    attitude: AttitudeLoop,
+    mixer: Mixer,
+    wanted: ThrustVector,
+    reference: Reference,
+}
+
+impl<'m> Flight<'m> {
+    /// A flight stack on the ground; `None` if the airframe cannot be mixed. The first setpoint is that of reference tick 0.
+    pub fn new(settings: &Settings) -> Option<Self> {
+        let mixer = Mixer::new(&settings.airframe)?;
+        Some(Self {
+            position_divisor: settings.rates.position_divisor.max(1),
+            preview: Preview::new(quadrotor::end_rules(), 0),
+            adapter: None,
+            position: PositionLoop::new(settings.position, settings.airframe.mass, settings.rates.reference_hz()),
+            attitude: AttitudeLoop::new(settings.attitude, settings.airframe.inertia),
+            mixer,
+            wanted: ThrustVector { force: nalgebra::Vector3::zeros(), attitude: nalgebra::Matrix3::identity() },
+            reference: Reference::default(),
+        })
+    }
+
+    /// Puts an add-on before the loop, with the lanes given.
+    ///
+    /// # Errors
+    /// If the model is for other signals, another rate, or a longer preview.
+    pub fn attach(&mut self, model: &'m Model<'m>, settings: &Settings, lanes: Lanes) -> Result<(), Refusal> {
+        let mut adapter = Adapter::new(model, &quadrotor::signals(), settings.rates.reference_hz(), PREVIEW)?;
+        adapter.switch(lanes);
+        self.adapter = Some(adapter);
+        Ok(())
+    }
+
+    /// The add-on, if there is one.
+    pub fn adapter(&mut self) -> Option<&mut QuadrotorAdapter<'m>> {
+        self.adapter.as_mut()
+    }
+
+    /// Appends the desired state of the next reference tick.
+    pub fn push_setpoint(&mut self, setpoint: &Setpoint) {
+        self.preview.push(quadrotor::desired(setpoint));
+    }
+
+    /// Reference tick of the next [`Flight::push_setpoint`].
+    pub fn next_setpoint(&self) -> i32 {
+        self.preview.next_tick()
+    }
+
+    /// The reference that the loop tracks now.
+    pub fn reference(&self) -> &Reference {
+        &self.reference
+    }
+
+    /// One control tick.
+    pub fn step(&mut self, tick: Tick, state: &State) -> MotorCommand {
+        if tick.0.is_multiple_of(self.position_divisor) {
+            let reference_tick = (tick.0 / self.position_divisor) as i32;
+            self.reference = self.adapted(reference_tick, state);
+            self.wanted = self.position.step(&self.reference, state);
+        }
+        let (thrust, moment) = self.attitude.step(&self.wanted, state);
+        self.mixer.mix(thrust, &moment)
+    }
+
+    fn adapted(&mut self, tick: i32, state: &State) -> Reference {
+        let desired = self.preview.sample(tick);
+        let yaw = desired[9];
+        match &mut self.adapter {
+            Some(adapter) => quadrotor::reference(&adapter.step(tick, &self.preview, &quadrotor::measured(state)), yaw),
+            None => {
+                let [px, py, pz, vx, vy, vz, ..] = desired;
+                quadrotor::reference(&[px, py, pz, vx, vy, vz], yaw)
+            }
+        }
+    }
+}

@@ -1,0 +1,258 @@
+//! What a model says of itself: decoded from the file's card, small enough for RAM. Numbers in bulk stay in the blob.
+//!
+//! *in* the postcard bytes of a [`Card`]; *out* names, shapes, limits and [`Section`]s of the blob; *never* bulk data;
+//! *source* the field list in the project's architecture: all that is needed to refuse a model.
+
+use heapless::Vec;
+use serde::{Deserialize, Serialize};
+
+use crate::{features::Feature, network::Activation, preview::EndRule};
+
+/// Most channels in one signal.
+pub const MAX_CHANNELS: usize = 16;
+/// Most network inputs.
+pub const MAX_FEATURES: usize = 128;
+/// Most corrected channels.
+pub const MAX_OUTPUTS: usize = 8;
+/// Most dense layers.
+pub const MAX_LAYERS: usize = 6;
+/// Most units in a layer.
+pub const MAX_WIDTH: usize = 256;
+/// Most axes of a feedback lane.
+pub const MAX_AXES: usize = 4;
+/// Most lags of a feedback lane.
+pub const MAX_LAGS: usize = 32;
+/// Most errors that one axis of a feedback lane reads.
+pub const MAX_ERRORS: usize = 2;
+
+/// A piece of the blob: byte offset from the blob's start and length in bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Section {
+    /// Byte offset from the blob's start.
+    pub offset: u32,
+    /// Length in bytes.
+    pub length: u32,
+}
+
+/// One channel of a signal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Channel<'a> {
+    /// Name, for example `position.x`.
+    pub name: &'a str,
+    /// SI unit, for example `m/s`.
+    pub unit: &'a str,
+    /// Frame, for example `world ENU`.
+    pub frame: &'a str,
+    /// What the channel is beyond the trajectory's ends.
+    pub end: EndRule,
+}
+
+/// The signals between which the model maps. An application refuses a model whose tables differ from its own.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SignalTable<'a> {
+    /// Channels of the desired trajectory.
+    #[serde(borrow)]
+    pub desired: Vec<Channel<'a>, MAX_CHANNELS>,
+    /// Channels of the measured state.
+    #[serde(borrow)]
+    pub measured: Vec<Channel<'a>, MAX_CHANNELS>,
+    /// Channels of the reference; each has the name of the desired channel that it starts from.
+    #[serde(borrow)]
+    pub reference: Vec<Channel<'a>, MAX_CHANNELS>,
+}
+
+/// Where a model comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Provenance<'a> {
+    /// Vehicle or plant.
+    pub vehicle: &'a str,
+    /// Gains of the baseline loop.
+    pub gains: &'a str,
+    /// Condition in which the logs were flown.
+    pub condition: &'a str,
+    /// Program and version that wrote the file.
+    pub software: &'a str,
+    /// Seed of the training run.
+    pub seed: u64,
+    /// CRC-32 of the training rows.
+    pub data_crc: u32,
+    /// Remarks: gates that were overridden, settings chosen.
+    pub remarks: &'a str,
+}
+
+/// Between sub-rate ticks the correction is held or ramped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Interpolation {
+    /// The value of the last sub-rate tick.
+    Hold,
+    /// A ramp from this sub-rate tick's value to the next one's, which is evaluated a sub-rate period ahead.
+    Linear,
+}
+
+/// Rates and delays.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Timing {
+    /// Rate of the reference, Hz.
+    pub reference_rate_hz: f32,
+    /// Reference ticks in a sub-rate tick of the network lane.
+    pub divisor: u16,
+    /// Held or ramped.
+    pub interpolation: Interpolation,
+    /// Age of the measured position when the loop receives it, in reference ticks (need not be whole).
+    pub measurement_delay_ticks: f32,
+    /// Time in which a lane is faded in or out, in reference ticks.
+    pub fade_ticks: u16,
+}
+
+/// A corrected reference channel.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Output {
+    /// Reference channel.
+    pub channel: u8,
+    /// Largest absolute correction, in the channel's unit.
+    pub limit: f32,
+    /// Largest change of the correction in a reference tick, in the channel's unit.
+    pub slew: f32,
+}
+
+/// Number format of the dense layers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Arithmetic {
+    /// f32 weights and activations.
+    Float,
+    /// int8 weights with a scale for each row, 16-bit activations, 32-bit accumulators.
+    Int8,
+}
+
+/// One dense layer; the meaning of the sections follows from [`Arithmetic`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LayerLayout {
+    /// Inputs.
+    pub inputs: u16,
+    /// Outputs.
+    pub outputs: u16,
+    /// Activation.
+    pub activation: Activation,
+    /// Packed weights (order: [`crate::network`]).
+    pub weights: Section,
+    /// Bias of each output: f32, or i32 in units of the accumulator.
+    pub bias: Section,
+    /// int8 only. Hidden layer: i32 multiplier of each row, value = (accumulator × multiplier) / 2³².
+    /// Last layer: f32 scale of each row.
+    pub requantisation: Section,
+}
+
+/// The network: normalise, dense layers plus a linear skip from the normalised inputs, denormalise.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NetworkLayout {
+    /// Number format.
+    pub arithmetic: Arithmetic,
+    /// f32 pairs: mean and reciprocal scale of each input, all means first.
+    pub input_normalisation: Section,
+    /// int8 only: f32 factor from a normalised input to its 16-bit code.
+    pub input_code: f32,
+    /// Dense layers; empty for a purely linear model.
+    pub layers: Vec<LayerLayout, MAX_LAYERS>,
+    /// f32 skip weights from normalised inputs to normalised outputs, packed as a float layer's; empty: none.
+    pub skip: Section,
+    /// f32: scale of each output, then mean of each output.
+    pub output_normalisation: Section,
+}
+
+/// One axis of the feedback lane.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LaneAxis {
+    /// Index into [`Card::outputs`].
+    pub output: u8,
+    /// Errors that the axis reads: (measured channel, desired channel).
+    pub errors: Vec<(u8, u8), MAX_ERRORS>,
+    /// f32: for each error its lags (newest first), then the lags of the axis' own past output (newest first).
+    pub coefficients: Section,
+    /// Factor of the integral of the first error, 1/s: value = integral coefficient × ∫ e dt.
+    pub integral: f32,
+    /// Clamp of the fast part, in the output's unit.
+    pub fast_limit: f32,
+    /// Clamp of the integral part, in the output's unit.
+    pub integral_limit: f32,
+}
+
+/// Margins of the add-on's own loop, computed at design time on a model of longer memory than the one designed on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Margins {
+    /// Further delay that the loop bears, ms.
+    pub delay_ms: f32,
+    /// Factor on the loop's gain that it bears.
+    pub gain: f32,
+    /// Smallest distance of the loop's frequency response from -1.
+    pub modulus: f32,
+}
+
+/// The feedback lane.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LaneLayout {
+    /// Lags of every error and of the past output.
+    pub lags: u8,
+    /// Axes.
+    pub axes: Vec<LaneAxis, MAX_AXES>,
+    /// Worst margins over the axes.
+    pub margins: Margins,
+}
+
+/// Inputs with the exact outputs expected, re-run by every machine that loads the file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Probes {
+    /// Number of probes.
+    pub count: u8,
+    /// f32: `count` × features, then `count` × outputs of the network lane.
+    pub network: Section,
+    /// f32: the lane's output on each axis at the end of [`crate::feedback::PROBE_TICKS`] ticks of the standard error sequence.
+    pub lane: Section,
+}
+
+/// Everything about a model but its bulk numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Card<'a> {
+    /// Name of the model.
+    pub name: &'a str,
+    /// Where it comes from.
+    #[serde(borrow)]
+    pub provenance: Provenance<'a>,
+    /// Signals with units and frames.
+    #[serde(borrow)]
+    pub signals: SignalTable<'a>,
+    /// Rates and delays.
+    pub timing: Timing,
+    /// Network inputs.
+    pub features: Vec<Feature, MAX_FEATURES>,
+    /// Corrected channels.
+    pub outputs: Vec<Output, MAX_OUTPUTS>,
+    /// Network lane.
+    pub network: Option<NetworkLayout>,
+    /// Feedback lane.
+    pub lane: Option<LaneLayout>,
+    /// f32: smallest, then largest value of each feature in training.
+    pub envelope: Section,
+    /// Probes.
+    pub probes: Probes,
+}
+
+impl Card<'_> {
+    /// Reference ticks of the past and of the future that the features and the lane read.
+    pub fn preview_span(&self) -> (u32, u32) {
+        let divisor = u32::from(self.timing.divisor);
+        let ahead = match self.timing.interpolation {
+            Interpolation::Hold => 0,
+            Interpolation::Linear => divisor,
+        };
+        let (mut past, mut future) = (self.timing.measurement_delay_ticks as u32 + 1, ahead);
+        for feature in &self.features {
+            let span = u32::from(feature.offset.unsigned_abs()) * divisor;
+            if feature.offset < 0 {
+                past = past.max(span);
+            } else {
+                future = future.max(span + ahead);
+            }
+        }
+        (past, future)
+    }
+}

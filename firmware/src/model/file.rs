@@ -1,0 +1,87 @@
+//! The model file: header, card, blob.
+//!
+//! *in* bytes; *out* the card's bytes and the blob's; *never* reads past the end, accepts a flipped bit or another version;
+//! *source* this file is the format's specification.
+//!
+//! | bytes | content |
+//! |--:|---|
+//! | 0..8 | `IMPROMPT` |
+//! | 8..10 | format version, u16 |
+//! | 10..12 | zero |
+//! | 12..16 | length of the card in bytes, u32 |
+//! | 16..20 | length of the blob in bytes, u32 |
+//! | 20..24 | CRC-32 (ISO-HDLC) of every other byte of the file, u32 |
+//! | 24..32 | zero |
+//! | 32.. | the card ([`super::Card`] in postcard), then zeros up to a multiple of 16, then the blob |
+//!
+//! All numbers are little-endian.
+
+use crc::{CRC_32_ISO_HDLC, Crc, Table};
+
+use super::refusal::Refusal;
+
+/// First bytes of every model file.
+pub const MAGIC: [u8; 8] = *b"IMPROMPT";
+/// Format version that this build reads and writes.
+pub const VERSION: u16 = 1;
+/// Length of the header in bytes.
+pub const HEADER: usize = 32;
+/// Alignment of the blob and of each of its sections, bytes.
+pub const ALIGNMENT: usize = 16;
+/// Largest file that is accepted: the F405's upper flash half.
+pub const MAX_FILE: usize = 512 * 1024;
+
+const CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
+
+/// Check sum of a file: everything but the check sum's own four bytes.
+pub fn checksum(bytes: &[u8]) -> u32 {
+    let mut digest = CRC.digest();
+    digest.update(bytes.get(..20).unwrap_or_default());
+    digest.update(bytes.get(24..).unwrap_or_default());
+    digest.finalize()
+}
+
+/// The header for a card and a blob of these lengths, with the check sum still zero.
+pub fn header(card: u32, blob: u32) -> [u8; HEADER] {
+    let mut header = [0; HEADER];
+    header[..8].copy_from_slice(&MAGIC);
+    header[8..10].copy_from_slice(&VERSION.to_le_bytes());
+    header[12..16].copy_from_slice(&card.to_le_bytes());
+    header[16..20].copy_from_slice(&blob.to_le_bytes());
+    header
+}
+
+/// Splits a checked file into card and blob.
+pub fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), Refusal> {
+    let Some((header, body)) = bytes.split_first_chunk::<HEADER>() else {
+        return Err(Refusal::TooShort { found: bytes.len() });
+    };
+    let word = |at: usize| u32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]]);
+    if header[..8] != MAGIC {
+        return Err(Refusal::NotAModel);
+    }
+    let version = u16::from_le_bytes([header[8], header[9]]);
+    if version != VERSION {
+        return Err(Refusal::Version { found: version });
+    }
+    let (card, blob, stored) = (word(12) as usize, word(16) as usize, word(20));
+    let padded = (card as u64).next_multiple_of(ALIGNMENT as u64);
+    let expected = HEADER as u64 + padded + blob as u64;
+    if expected > MAX_FILE as u64 {
+        return Err(Refusal::Shape {
+            what: "file length",
+            found: u32::try_from(expected).unwrap_or(u32::MAX),
+            limit: MAX_FILE as u32,
+        });
+    }
+    if expected != bytes.len() as u64 {
+        return Err(Refusal::Length { expected, found: bytes.len() });
+    }
+    let computed = checksum(bytes);
+    if computed != stored {
+        return Err(Refusal::Checksum { stored, computed });
+    }
+    let (card_bytes, rest) = body.split_at_checked(card).ok_or(Refusal::Card)?;
+    let blob_bytes = rest.get(rest.len().saturating_sub(blob)..).ok_or(Refusal::Card)?;
+    Ok((card_bytes, blob_bytes))
+}

@@ -1,0 +1,78 @@
+//! The one stored model type: checked once at load, then borrowed in place.
+//!
+//! *in* the bytes of a model file; *out* a [`Model`] whose every index, shape and probe has been checked; *never* a panic on
+//! any bytes; *source* [`file`] for the layout, [`Card`] for the fields.
+
+mod blob;
+mod card;
+pub mod file;
+mod refusal;
+mod validate;
+
+pub use blob::{Blob, Floats, Integers};
+pub use card::*;
+pub use refusal::Refusal;
+
+use crate::{feedback::Lane, network::Network};
+
+/// A model that passed every check.
+#[derive(Debug)]
+pub struct Model<'a> {
+    card: Card<'a>,
+    network: Option<Network<'a>>,
+    lane: Option<Lane<'a>>,
+    envelope: (Floats<'a>, Floats<'a>),
+    checksum: u32,
+}
+
+impl<'a> Model<'a> {
+    /// Checks a model file and borrows its numbers.
+    ///
+    /// # Errors
+    /// A [`Refusal`] that names what is wrong: header, check sum, card, shapes, indices, values, probes.
+    pub fn from_bytes(bytes: &'a [u8]) -> Result<Self, Refusal> {
+        let (card, blob) = file::split(bytes)?;
+        let (card, rest) = postcard::take_from_bytes::<Card<'a>>(card).map_err(|_| Refusal::Card)?;
+        if !rest.is_empty() {
+            return Err(Refusal::Card);
+        }
+        let blob = Blob(blob);
+        validate::card(&card)?;
+        let network = match &card.network {
+            Some(layout) => Some(Network::new(layout, &blob, card.features.len(), card.outputs.len())?),
+            None => None,
+        };
+        let lane = match &card.lane {
+            Some(layout) => Some(Lane::new(layout, &blob)?),
+            None => None,
+        };
+        let envelope = blob.floats(card.envelope, 2 * card.features.len(), "envelope")?.split_at(card.features.len());
+        validate::probes(&card, &blob, network.as_ref(), lane.as_ref())?;
+        Ok(Self { card, network, lane, envelope, checksum: file::checksum(bytes) })
+    }
+
+    /// What the model says of itself.
+    pub fn card(&self) -> &Card<'a> {
+        &self.card
+    }
+
+    /// The network lane's map.
+    pub fn network(&self) -> Option<&Network<'a>> {
+        self.network.as_ref()
+    }
+
+    /// The feedback lane's map.
+    pub fn lane(&self) -> Option<&Lane<'a>> {
+        self.lane.as_ref()
+    }
+
+    /// Smallest and largest value of each feature in training.
+    pub fn envelope(&self) -> (Floats<'a>, Floats<'a>) {
+        self.envelope
+    }
+
+    /// CRC-32 that identifies the file.
+    pub fn checksum(&self) -> u32 {
+        self.checksum
+    }
+}

@@ -1,0 +1,175 @@
+//! Why a model file is not flown.
+
+use core::fmt;
+
+/// The reason, with the name of what is wrong. `Display` also says what to do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Refusal {
+    /// Fewer bytes than a header.
+    TooShort {
+        /// Bytes found.
+        found: usize,
+    },
+    /// The first eight bytes are not the format's.
+    NotAModel,
+    /// Another format version.
+    Version {
+        /// Version in the file.
+        found: u16,
+    },
+    /// The header's lengths and the number of bytes disagree.
+    Length {
+        /// Bytes that the header announces.
+        expected: u64,
+        /// Bytes found.
+        found: usize,
+    },
+    /// The check sum is wrong: a damaged file.
+    Checksum {
+        /// Check sum in the file.
+        stored: u32,
+        /// Check sum of the bytes.
+        computed: u32,
+    },
+    /// The card cannot be decoded.
+    Card,
+    /// A count or shape is impossible or beyond this build's fixed sizes.
+    Shape {
+        /// The field.
+        what: &'static str,
+        /// Value in the file.
+        found: u32,
+        /// Largest (or only) value that is possible.
+        limit: u32,
+    },
+    /// A section has another length than its shape asks for.
+    SectionLength {
+        /// The section.
+        what: &'static str,
+        /// Bytes that the shape asks for.
+        expected: u32,
+        /// Bytes in the file.
+        found: u32,
+    },
+    /// A section does not start at a multiple of 16 bytes.
+    SectionAlignment {
+        /// The section.
+        what: &'static str,
+    },
+    /// A section lies outside of the blob.
+    SectionRange {
+        /// The section.
+        what: &'static str,
+    },
+    /// A number is NaN or infinite.
+    NotFinite {
+        /// The field or section.
+        what: &'static str,
+    },
+    /// A number is outside of its meaningful range.
+    Value {
+        /// The field.
+        what: &'static str,
+    },
+    /// An index names a channel or output that the model does not have.
+    Index {
+        /// The field.
+        what: &'static str,
+        /// The index.
+        found: u8,
+    },
+    /// An integer layer could overflow its accumulator.
+    Overflow {
+        /// Layer, from 0.
+        layer: u8,
+    },
+    /// A probe gave other bits than the file says: this machine would fly another network.
+    Probe {
+        /// Index of the probe; `u8::MAX` for the feedback lane's.
+        index: u8,
+    },
+    /// The signal tables of the model and of the application differ.
+    Signal {
+        /// `desired`, `measured` or `reference`.
+        signal: &'static str,
+        /// First channel that differs.
+        channel: u8,
+    },
+    /// The application's preview is shorter than the model's window.
+    Preview {
+        /// Samples that the model needs.
+        needed: u32,
+        /// Samples that the application keeps.
+        available: u32,
+    },
+    /// The application runs its references at another rate.
+    Rate {
+        /// Rate of the model, Hz.
+        model: f32,
+        /// Rate of the application, Hz.
+        application: f32,
+    },
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::TooShort { found } => write!(f, "{found} bytes are too few for a model file: export it again"),
+            Self::NotAModel => {
+                write!(f, "not a model file (its first bytes are not IMPROMPT): give the file that model-export wrote")
+            }
+            Self::Version { found } => {
+                write!(
+                    f,
+                    "format version {found}, this build reads {}: export the model with the matching model-export",
+                    super::file::VERSION
+                )
+            }
+            Self::Length { expected, found } => {
+                write!(
+                    f,
+                    "the header announces {expected} bytes, the file has {found}: it is truncated or has trailing bytes, copy it again"
+                )
+            }
+            Self::Checksum { stored, computed } => {
+                write!(f, "check sum {stored:08x} in the file, {computed:08x} computed: the file is damaged, copy it again")
+            }
+            Self::Card => write!(f, "the model card cannot be decoded: export the model again"),
+            Self::Shape { what, found, limit } => write!(f, "{what} is {found}, possible is {limit}: train a model that fits"),
+            Self::SectionLength { what, expected, found } => {
+                write!(f, "section {what} has {found} bytes, its shape asks for {expected}: export the model again")
+            }
+            Self::SectionAlignment { what } => write!(f, "section {what} is not aligned to 16 bytes: export the model again"),
+            Self::SectionRange { what } => write!(f, "section {what} lies outside of the file: export the model again"),
+            Self::NotFinite { what } => {
+                write!(f, "{what} holds a number that is not finite: the training diverged or the file was edited")
+            }
+            Self::Value { what } => {
+                write!(f, "{what} is out of its meaningful range: correct it in the description and export again")
+            }
+            Self::Index { what, found } => write!(f, "{what} names index {found}, which the model does not have"),
+            Self::Overflow { layer } => {
+                write!(f, "layer {layer} could overflow its 32-bit accumulator: calibrate and export again")
+            }
+            Self::Probe { index: u8::MAX } => {
+                write!(f, "the feedback lane's probe gives other bits on this machine: do not fly, report it")
+            }
+            Self::Probe { index } => write!(f, "probe {index} gives other bits on this machine: do not fly, report it"),
+            Self::Signal { signal, channel } => {
+                write!(
+                    f,
+                    "channel {channel} of the {signal} signal differs from the application's in name, unit, frame or end rule"
+                )
+            }
+            Self::Preview { needed, available } => {
+                write!(f, "the model looks at {needed} samples, the preview keeps {available}")
+            }
+            Self::Rate { model, application } => {
+                write!(f, "trained for references at {model} Hz, the application runs {application} Hz")
+            }
+        }
+    }
+}
+
+impl core::error::Error for Refusal {}

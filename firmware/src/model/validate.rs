@@ -1,0 +1,166 @@
+//! Checks of a decoded card: every index exists, every number makes sense, every probe gives its bits.
+
+use super::{Blob, Card, LaneLayout, MAX_LAGS, MAX_WIDTH, Refusal};
+use crate::{
+    features::{Relative, Source},
+    feedback::{self, Lane},
+    network::{Network, Scratch},
+};
+
+/// Longest look into the past or the future of one feature, in reference ticks.
+const MAX_OFFSET_TICKS: i32 = 10_000;
+
+/// Indices, ranges and values of a card.
+pub(super) fn card(card: &Card<'_>) -> Result<(), Refusal> {
+    timing(card)?;
+    signals(card)?;
+    features(card)?;
+    outputs(card)?;
+    if let Some(network) = &card.network {
+        if card.features.is_empty() {
+            return Err(Refusal::Shape { what: "number of features", found: 0, limit: super::MAX_FEATURES as u32 });
+        }
+        for layer in &network.layers {
+            for (what, width) in [("layer inputs", layer.inputs), ("layer outputs", layer.outputs)] {
+                if width == 0 || usize::from(width) > MAX_WIDTH {
+                    return Err(Refusal::Shape { what, found: width.into(), limit: MAX_WIDTH as u32 });
+                }
+            }
+        }
+    }
+    card.lane.as_ref().map_or(Ok(()), |lane| self::lane(card, lane))
+}
+
+fn timing(card: &Card<'_>) -> Result<(), Refusal> {
+    let timing = &card.timing;
+    let rate = timing.reference_rate_hz;
+    if !(rate.is_finite() && rate > 0.0) {
+        return Err(Refusal::Value { what: "reference rate" });
+    }
+    if timing.divisor == 0 {
+        return Err(Refusal::Value { what: "sub-rate divisor" });
+    }
+    if !(timing.measurement_delay_ticks >= 0.0 && timing.measurement_delay_ticks < 1000.0) {
+        return Err(Refusal::Value { what: "measurement delay" });
+    }
+    Ok(())
+}
+
+fn signals(card: &Card<'_>) -> Result<(), Refusal> {
+    for (index, channel) in card.signals.reference.iter().enumerate() {
+        if !card.signals.desired.iter().any(|desired| desired.name == channel.name) {
+            return Err(Refusal::Signal { signal: "reference", channel: index as u8 });
+        }
+    }
+    Ok(())
+}
+
+fn features(card: &Card<'_>) -> Result<(), Refusal> {
+    let signals = &card.signals;
+    let inside = |found: u8, count: usize, what| {
+        if usize::from(found) < count { Ok(()) } else { Err(Refusal::Index { what, found }) }
+    };
+    for feature in &card.features {
+        let (count, future) = match feature.source {
+            Source::Desired => (signals.desired.len(), true),
+            Source::Measured => (signals.measured.len(), false),
+            Source::Reference => (signals.reference.len(), false),
+        };
+        inside(feature.channel, count, "feature channel")?;
+        match feature.relative {
+            Relative::Nothing => {}
+            Relative::Desired(origin) => inside(origin, signals.desired.len(), "feature origin")?,
+            Relative::Measured(origin) => inside(origin, signals.measured.len(), "feature origin")?,
+        }
+        let ticks = i32::from(feature.offset) * i32::from(card.timing.divisor);
+        let newest = match feature.source {
+            Source::Reference => -1,
+            _ => 0,
+        };
+        let history = -(crate::adapter::HISTORY as i16) + 2;
+        let beyond = !future && (feature.offset > newest || feature.offset < history);
+        if ticks.abs() > MAX_OFFSET_TICKS || beyond {
+            return Err(Refusal::Value { what: "feature offset" });
+        }
+    }
+    Ok(())
+}
+
+fn outputs(card: &Card<'_>) -> Result<(), Refusal> {
+    for (index, output) in card.outputs.iter().enumerate() {
+        let found = output.channel;
+        if usize::from(found) >= card.signals.reference.len() {
+            return Err(Refusal::Index { what: "output channel", found });
+        }
+        if card.outputs.iter().take(index).any(|other| other.channel == found) {
+            return Err(Refusal::Index { what: "output channel named twice,", found });
+        }
+        if !(output.limit.is_finite() && output.limit >= 0.0 && output.slew.is_finite() && output.slew > 0.0) {
+            return Err(Refusal::Value { what: "output limit or slew" });
+        }
+    }
+    Ok(())
+}
+
+fn lane(card: &Card<'_>, lane: &LaneLayout) -> Result<(), Refusal> {
+    if lane.lags == 0 || usize::from(lane.lags) > MAX_LAGS {
+        return Err(Refusal::Shape { what: "lane lags", found: lane.lags.into(), limit: MAX_LAGS as u32 });
+    }
+    for axis in &lane.axes {
+        if usize::from(axis.output) >= card.outputs.len() {
+            return Err(Refusal::Index { what: "lane output", found: axis.output });
+        }
+        if axis.errors.is_empty() {
+            return Err(Refusal::Shape { what: "lane errors", found: 0, limit: super::MAX_ERRORS as u32 });
+        }
+        for &(measured, desired) in &axis.errors {
+            if usize::from(measured) >= card.signals.measured.len() {
+                return Err(Refusal::Index { what: "lane measured channel", found: measured });
+            }
+            if usize::from(desired) >= card.signals.desired.len() {
+                return Err(Refusal::Index { what: "lane desired channel", found: desired });
+            }
+        }
+        let limits = [axis.fast_limit, axis.integral_limit];
+        if !axis.integral.is_finite() || limits.iter().any(|limit| !(limit.is_finite() && *limit >= 0.0)) {
+            return Err(Refusal::Value { what: "lane integral or limit" });
+        }
+    }
+    Ok(())
+}
+
+/// Re-runs the probes: the bits must be the file's.
+pub(super) fn probes(
+    card: &Card<'_>,
+    blob: &Blob<'_>,
+    network: Option<&Network<'_>>,
+    lane: Option<&Lane<'_>>,
+) -> Result<(), Refusal> {
+    let (inputs, outputs) = (card.features.len(), card.outputs.len());
+    let count = usize::from(card.probes.count);
+    let stored = blob.floats(card.probes.network, count * (inputs + outputs), "network probes")?;
+    let (probe_inputs, probe_outputs) = stored.split_at(count * inputs);
+    if let Some(network) = network {
+        let mut scratch = Scratch::new();
+        let (mut x, mut y) = ([0.0; super::MAX_FEATURES], [0.0; super::MAX_OUTPUTS]);
+        for probe in 0..count {
+            for (i, value) in x.iter_mut().enumerate().take(inputs) {
+                *value = probe_inputs.get(probe * inputs + i);
+            }
+            network.evaluate(&x, &mut y, &mut scratch);
+            let same =
+                (0..outputs).all(|o| y.get(o).is_some_and(|y| y.to_bits() == probe_outputs.get(probe * outputs + o).to_bits()));
+            if !same {
+                return Err(Refusal::Probe { index: probe as u8 });
+            }
+        }
+    }
+    if let Some(lane) = lane {
+        let expected = blob.floats(card.probes.lane, lane.axes().len(), "lane probe")?;
+        let found = feedback::probe(lane, 1.0 / card.timing.reference_rate_hz);
+        if !expected.iter().zip(found).all(|(expected, found)| expected.to_bits() == found.to_bits()) {
+            return Err(Refusal::Probe { index: u8::MAX });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,92 @@
+//! The flight stack's signals: which channels a quadrotor's models map between.
+//!
+//! *in* setpoints, states and references; *out* channel arrays; *never* another order than the tables say;
+//! *source* Zhou 2017, section V-A (position and velocity references out; position, velocity, attitude, rates in).
+
+use nalgebra::Vector3;
+
+use crate::{
+    math::{coarse_asin, coarse_atan2},
+    model::{Channel, SignalTable},
+    preview::EndRule,
+    types::{Reference, Setpoint, State},
+};
+
+/// Desired channels: position, velocity, acceleration, yaw.
+pub const DESIRED: usize = 10;
+/// Measured channels: position, velocity, roll-pitch-yaw, body rates, vertical acceleration.
+pub const MEASURED: usize = 13;
+/// Reference channels: position, velocity.
+pub const REFERENCE: usize = 6;
+
+const POSITION: [&str; 3] = ["position.x", "position.y", "position.z"];
+const VELOCITY: [&str; 3] = ["velocity.x", "velocity.y", "velocity.z"];
+
+fn channels<'a>(
+    names: impl IntoIterator<Item = &'a str>,
+    unit: &'a str,
+    frame: &'a str,
+    end: EndRule,
+) -> impl Iterator<Item = Channel<'a>> {
+    names.into_iter().map(move |name| Channel { name, unit, frame, end })
+}
+
+/// The signal table of the flight stack.
+pub fn signals() -> SignalTable<'static> {
+    let world = "world ENU";
+    let position = || channels(POSITION, "m", world, EndRule::Hold);
+    let velocity = || channels(VELOCITY, "m/s", world, EndRule::Zero);
+    let acceleration = channels(["acceleration.x", "acceleration.y", "acceleration.z"], "m/s^2", world, EndRule::Zero);
+    let angles = channels(["roll", "pitch", "yaw"], "rad", "body FLU to world ENU", EndRule::Hold);
+    let rates = channels(["rate.x", "rate.y", "rate.z"], "rad/s", "body FLU", EndRule::Hold);
+    SignalTable {
+        desired: position().chain(velocity()).chain(acceleration).chain(channels(["yaw"], "rad", world, EndRule::Hold)).collect(),
+        measured: position()
+            .chain(velocity())
+            .chain(angles)
+            .chain(rates)
+            .chain(channels(["acceleration.z"], "m/s^2", world, EndRule::Hold))
+            .collect(),
+        reference: position().chain(velocity()).collect(),
+    }
+}
+
+/// End rules of the desired channels.
+pub fn end_rules() -> [EndRule; DESIRED] {
+    core::array::from_fn(|channel| if matches!(channel, 3..=8) { EndRule::Zero } else { EndRule::Hold })
+}
+
+/// A setpoint as desired channels.
+pub fn desired(setpoint: &Setpoint) -> [f32; DESIRED] {
+    let Setpoint { position: p, velocity: v, acceleration: a, yaw } = setpoint;
+    [p.x, p.y, p.z, v.x, v.y, v.z, a.x, a.y, a.z, *yaw]
+}
+
+/// A state as measured channels. Angles are approximate ([`coarse_atan2`]); only the network reads them.
+pub fn measured(state: &State) -> [f32; MEASURED] {
+    let State { position: p, velocity: v, attitude, rates: w, vertical_acceleration } = state;
+    let [x, y, z, s] = [attitude.i, attitude.j, attitude.k, attitude.w];
+    let roll = coarse_atan2(2.0 * (s * x + y * z), 1.0 - 2.0 * (x * x + y * y));
+    let pitch = coarse_asin(2.0 * (s * y - z * x));
+    let yaw = coarse_atan2(2.0 * (s * z + x * y), 1.0 - 2.0 * (y * y + z * z));
+    [p.x, p.y, p.z, v.x, v.y, v.z, roll, pitch, yaw, w.x, w.y, w.z, *vertical_acceleration]
+}
+
+/// Reference channels as the baseline loop's reference; yaw is not adapted.
+pub fn reference(channels: &[f32; REFERENCE], yaw: f32) -> Reference {
+    let [px, py, pz, vx, vy, vz] = *channels;
+    Reference { position: Vector3::new(px, py, pz), velocity: Vector3::new(vx, vy, vz), yaw }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_count_as_many_channels_as_the_arrays() {
+        let table = signals();
+        assert_eq!([table.desired.len(), table.measured.len(), table.reference.len()], [DESIRED, MEASURED, REFERENCE]);
+        let rules = end_rules();
+        assert!(table.desired.iter().zip(rules).all(|(channel, rule)| channel.end == rule));
+    }
+}
