@@ -33,7 +33,11 @@ pub struct Lane<'a> {
 }
 
 impl<'a> Lane<'a> {
-    pub(crate) fn new(layout: &LaneLayout, blob: &Blob<'a>) -> Result<Self, Refusal> {
+    /// Checks shapes and values of a layout against the blob.
+    ///
+    /// # Errors
+    /// With the section or value that is wrong.
+    pub fn new(layout: &LaneLayout, blob: &Blob<'a>) -> Result<Self, Refusal> {
         let lags = usize::from(layout.lags);
         let mut axes = Vec::new();
         for axis in &layout.axes {

@@ -1,1 +1,15 @@
-//! Model export.
+//! Float network in, checked and self-describing model file out.
+//!
+//! *in* a [`FloatNetwork`] (safetensors), its [`Description`] (JSON) and rows to calibrate on; *out* the bytes that
+//! `impromptu_firmware::model::Model::from_bytes` accepts; *never* a file that the firmware would refuse: every file is loaded by the
+//! firmware's own code before it is handed out; *source* the format in `impromptu_firmware::model::file`.
+
+pub mod description;
+pub mod encode;
+pub mod float_network;
+pub mod quantise;
+pub mod verify;
+
+pub use description::Description;
+pub use encode::{ExportError, Precision, encode};
+pub use float_network::FloatNetwork;

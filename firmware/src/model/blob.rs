@@ -69,9 +69,14 @@ impl<'a> Integers<'a> {
 
 /// The bytes behind the card.
 #[derive(Clone, Copy, Debug)]
-pub struct Blob<'a>(pub(super) &'a [u8]);
+pub struct Blob<'a>(&'a [u8]);
 
 impl<'a> Blob<'a> {
+    /// The bulk numbers in `bytes`.
+    pub fn new(bytes: &'a [u8]) -> Self {
+        Self(bytes)
+    }
+
     /// The bytes of a section that must have `length` bytes; `what` names it if it does not.
     pub fn bytes(&self, section: Section, length: usize, what: &'static str) -> Result<&'a [u8], Refusal> {
         let start = section.offset as usize;

@@ -36,7 +36,7 @@ impl<'a> Model<'a> {
         if !rest.is_empty() {
             return Err(Refusal::Card);
         }
-        let blob = Blob(blob);
+        let blob = Blob::new(blob);
         validate::card(&card)?;
         let network = match &card.network {
             Some(layout) => Some(Network::new(layout, &blob, card.features.len(), card.outputs.len())?),

@@ -1,0 +1,339 @@
+//! Description and network to the bytes of a model file.
+
+use impromptu_firmware::{
+    feedback,
+    model::{
+        self, Arithmetic, Card, Channel, LaneAxis, LaneLayout, LayerLayout, Model, NetworkLayout, Probes, Refusal, Section,
+        SignalTable, file,
+    },
+    network::{self, ROWS, Scratch},
+};
+
+use crate::{
+    description::{ChannelDescription, Description},
+    float_network::{Activation, FloatNetwork, FloatNetworkError},
+    quantise::{IntegerLayer, quantise},
+};
+
+/// Number format of the dense layers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Precision {
+    /// f32 weights and activations.
+    Float,
+    /// int8 weights, 16-bit activations.
+    Int8,
+}
+
+/// Why no model file was made.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// The network's parts do not fit together.
+    #[error("network: {0}")]
+    Network(#[from] FloatNetworkError),
+    /// Network and description disagree.
+    #[error("{what}: the description has {description}, the network {network}")]
+    Mismatch {
+        /// What is counted.
+        what: &'static str,
+        /// Count in the description.
+        description: usize,
+        /// Count in the network.
+        network: usize,
+    },
+    /// More than the firmware's fixed sizes hold.
+    #[error("{what}: {found}, the firmware holds at most {limit}")]
+    TooMany {
+        /// What is counted.
+        what: &'static str,
+        /// Count found.
+        found: usize,
+        /// Largest count.
+        limit: usize,
+    },
+    /// Quantisation without rows to calibrate on.
+    #[error("int8 needs rows to calibrate on: give --calibration FILE.csv")]
+    NoCalibration,
+    /// The firmware refuses the file that came out.
+    #[error("the firmware refuses the result: {0}")]
+    Refused(Refusal),
+}
+
+/// Bulk numbers in file order, each section aligned.
+#[derive(Default)]
+struct BlobWriter(Vec<u8>);
+
+impl BlobWriter {
+    fn bytes(&mut self, bytes: impl IntoIterator<Item = u8>) -> Section {
+        self.0.resize(self.0.len().next_multiple_of(file::ALIGNMENT), 0);
+        let offset = self.0.len();
+        self.0.extend(bytes);
+        Section { offset: offset as u32, length: (self.0.len() - offset) as u32 }
+    }
+
+    fn floats(&mut self, values: impl IntoIterator<Item = f32>) -> Section {
+        self.bytes(values.into_iter().flat_map(f32::to_le_bytes))
+    }
+
+    fn integers(&mut self, values: impl IntoIterator<Item = i32>) -> Section {
+        self.bytes(values.into_iter().flat_map(i32::to_le_bytes))
+    }
+}
+
+/// Rows in the kernel's order: `[block of 8 rows][input][row in block]`, the last block padded with `zero`.
+fn packed<T: Copy>(rows: &[T], inputs: usize, zero: T) -> Vec<T> {
+    let outputs = rows.len() / inputs.max(1);
+    let mut packed = Vec::with_capacity(network::padded(outputs) * inputs);
+    for block in (0..outputs).step_by(ROWS) {
+        for input in 0..inputs {
+            packed.extend(
+                (block..block + ROWS)
+                    .map(|row| rows.get(row * inputs + input).filter(|_| row < outputs).copied().unwrap_or(zero)),
+            );
+        }
+    }
+    packed
+}
+
+fn padded<T: Copy>(values: &[T], zero: T) -> impl Iterator<Item = T> + '_ {
+    let missing = network::padded(values.len()) - values.len();
+    values.iter().copied().chain(std::iter::repeat_n(zero, missing))
+}
+
+fn bounded<T: Clone, const N: usize>(values: &[T], what: &'static str) -> Result<heapless::Vec<T, N>, ExportError> {
+    heapless::Vec::from_slice(values).map_err(|_| ExportError::TooMany { what, found: values.len(), limit: N })
+}
+
+fn activation(activation: Activation) -> network::Activation {
+    match activation {
+        Activation::Linear => network::Activation::Linear,
+        Activation::Relu => network::Activation::Relu,
+        Activation::Tanh => network::Activation::Tanh,
+    }
+}
+
+/// Lays a network out for the kernel.
+fn layout(
+    network: &FloatNetwork,
+    precision: Precision,
+    calibration: &[Vec<f32>],
+    blob: &mut BlobWriter,
+) -> Result<NetworkLayout, ExportError> {
+    let reciprocal = network.input_scale.iter().map(|scale| 1.0 / scale);
+    let mut layout = NetworkLayout {
+        arithmetic: Arithmetic::Float,
+        input_normalisation: blob.floats(network.input_mean.iter().copied().chain(reciprocal)),
+        input_code: 0.0,
+        layers: heapless::Vec::new(),
+        skip: Section::default(),
+        output_normalisation: blob.floats(network.output_scale.iter().chain(&network.output_mean).copied()),
+    };
+    if let Some(skip) = &network.skip {
+        layout.skip = blob.floats(packed(skip, network.inputs(), 0.0));
+    }
+    let mut inputs = network.inputs();
+    let mut layers = Vec::new();
+    match precision {
+        Precision::Float => {
+            for layer in &network.layers {
+                layers.push(LayerLayout {
+                    inputs: inputs as u16,
+                    outputs: layer.outputs() as u16,
+                    activation: activation(layer.activation),
+                    weights: blob.floats(packed(&layer.weights, inputs, 0.0)),
+                    bias: blob.floats(padded(&layer.bias, 0.0)),
+                    requantisation: Section::default(),
+                });
+                inputs = layer.outputs();
+            }
+        }
+        Precision::Int8 => {
+            if calibration.is_empty() && !network.layers.is_empty() {
+                return Err(ExportError::NoCalibration);
+            }
+            let integers = quantise(network, calibration.iter().map(Vec::as_slice));
+            layout.arithmetic = Arithmetic::Int8;
+            layout.input_code = integers.input_code;
+            for layer in &integers.layers {
+                layers.push(integer_layout(layer, inputs, blob));
+                inputs = layer.bias.len();
+            }
+        }
+    }
+    layout.layers = bounded(&layers, "dense layers")?;
+    Ok(layout)
+}
+
+fn integer_layout(layer: &IntegerLayer, inputs: usize, blob: &mut BlobWriter) -> LayerLayout {
+    let weights = packed(&layer.weights, inputs, 0).into_iter().map(|weight| weight as u8);
+    LayerLayout {
+        inputs: inputs as u16,
+        outputs: layer.bias.len() as u16,
+        activation: activation(layer.activation),
+        weights: blob.bytes(weights),
+        bias: blob.integers(padded(&layer.bias, 0)),
+        requantisation: if layer.multipliers.is_empty() {
+            blob.floats(padded(&layer.row_scales, 0.0))
+        } else {
+            blob.integers(padded(&layer.multipliers, 0))
+        },
+    }
+}
+
+fn channels<'a, const N: usize>(
+    channels: &'a [ChannelDescription],
+    what: &'static str,
+) -> Result<heapless::Vec<Channel<'a>, N>, ExportError> {
+    let borrowed: Vec<Channel<'a>> = channels
+        .iter()
+        .map(|channel| Channel { name: &channel.name, unit: &channel.unit, frame: &channel.frame, end: channel.end })
+        .collect();
+    bounded(&borrowed, what)
+}
+
+fn lane(description: &Description, blob: &mut BlobWriter) -> Result<Option<LaneLayout>, ExportError> {
+    let Some(lane) = &description.lane else { return Ok(None) };
+    let lags = lane.axes.first().map_or(0, |axis| axis.output_coefficients.len());
+    let mut axes = Vec::new();
+    for axis in &lane.axes {
+        for found in axis.error_coefficients.iter().chain([&axis.output_coefficients]).map(Vec::len) {
+            if found != lags {
+                return Err(ExportError::Mismatch { what: "lags of the feedback lane", description: lags, network: found });
+            }
+        }
+        let coefficients = axis.error_coefficients.iter().flatten().chain(&axis.output_coefficients).copied();
+        axes.push(LaneAxis {
+            output: axis.output,
+            errors: bounded(&axis.errors, "errors of a lane axis")?,
+            coefficients: blob.floats(coefficients),
+            integral: axis.integral,
+            fast_limit: axis.fast_limit,
+            integral_limit: axis.integral_limit,
+        });
+    }
+    Ok(Some(LaneLayout { lags: lags as u8, axes: bounded(&axes, "lane axes")?, margins: lane.margins }))
+}
+
+/// The bytes of a model file. `calibration` are rows of features in physical units: ranges of the integer network and probes come from
+/// them. A description without a network (`None`) makes a file with the feedback lane alone.
+///
+/// # Errors
+/// If parts do not fit together, or the firmware would refuse the file.
+pub fn encode(
+    description: &Description,
+    network: Option<&FloatNetwork>,
+    precision: Precision,
+    calibration: &[Vec<f32>],
+) -> Result<Vec<u8>, ExportError> {
+    let features = description.features.len();
+    if let Some(network) = network {
+        network.check()?;
+        let counts = [
+            ("inputs", features, network.inputs()),
+            ("outputs", description.outputs.len(), network.outputs()),
+            ("envelope", description.envelope.len(), network.inputs()),
+        ];
+        for (what, description, network) in counts {
+            if description != network {
+                return Err(ExportError::Mismatch { what, description, network });
+            }
+        }
+    }
+    if let Some(row) = calibration.iter().find(|row| row.len() != features) {
+        return Err(ExportError::Mismatch { what: "columns of the calibration rows", description: features, network: row.len() });
+    }
+    let mut blob = BlobWriter::default();
+    let network = network.map(|network| layout(network, precision, calibration, &mut blob)).transpose()?;
+    let lane = lane(description, &mut blob)?;
+    let minima = description.envelope.iter().map(|(low, _)| *low);
+    let maxima = description.envelope.iter().map(|(_, high)| *high);
+    let provenance = &description.provenance;
+    let timing = &description.timing;
+    let mut card = Card {
+        name: &description.name,
+        provenance: model::Provenance {
+            vehicle: &provenance.vehicle,
+            gains: &provenance.gains,
+            condition: &provenance.condition,
+            software: &provenance.software,
+            seed: provenance.seed,
+            data_crc: provenance.data_crc,
+            remarks: &provenance.remarks,
+        },
+        signals: SignalTable {
+            desired: channels(&description.signals.desired, "desired channels")?,
+            measured: channels(&description.signals.measured, "measured channels")?,
+            reference: channels(&description.signals.reference, "reference channels")?,
+        },
+        timing: model::Timing {
+            reference_rate_hz: timing.reference_rate_hz,
+            divisor: timing.divisor,
+            interpolation: timing.interpolation,
+            measurement_delay_ticks: timing.measurement_delay_s * timing.reference_rate_hz,
+            fade_ticks: (timing.fade_s * timing.reference_rate_hz).round() as u16,
+        },
+        features: bounded(&description.features, "features")?,
+        outputs: bounded(&description.outputs, "outputs")?,
+        network,
+        lane,
+        envelope: blob.floats(minima.chain(maxima)),
+        probes: Probes::default(),
+    };
+    let lane_outputs = card.lane.as_ref().map_or(0, |lane| lane.axes.len());
+    // The probes' expected outputs come from the firmware itself, out of a file without probes.
+    let bare_lane = Section { offset: 0, length: 0 };
+    let mut bare = card.clone();
+    bare.probes.lane = bare_lane;
+    let probe_rows = probe_rows(calibration, card.network.is_some());
+    let (outputs, lane_probe) = expected(&bare, &blob, &probe_rows)?;
+    card.probes = Probes {
+        count: probe_rows.len() as u8,
+        network: blob.floats(probe_rows.into_iter().flatten().chain(outputs)),
+        lane: blob.floats(lane_probe.into_iter().take(lane_outputs)),
+    };
+    let bytes = assemble(&card, &blob.0)?;
+    Model::from_bytes(&bytes).map_err(ExportError::Refused)?;
+    Ok(bytes)
+}
+
+/// Up to four rows, spread over the calibration rows.
+fn probe_rows(calibration: &[Vec<f32>], wanted: bool) -> Vec<Vec<f32>> {
+    let step = (calibration.len() / 4).max(1);
+    calibration.iter().step_by(step).take(if wanted { 4 } else { 0 }).cloned().collect()
+}
+
+/// What the firmware computes for the probes.
+fn expected(card: &Card<'_>, blob: &BlobWriter, rows: &[Vec<f32>]) -> Result<(Vec<f32>, [f32; model::MAX_AXES]), ExportError> {
+    let mut without_lane = card.clone();
+    without_lane.lane = None;
+    let bytes = assemble(&without_lane, &blob.0)?;
+    let model = Model::from_bytes(&bytes).map_err(ExportError::Refused)?;
+    let mut outputs = Vec::new();
+    if let Some(network) = model.network() {
+        let mut scratch = Scratch::new();
+        for row in rows {
+            let mut output = [0.0; model::MAX_OUTPUTS];
+            network.evaluate(row, &mut output, &mut scratch);
+            outputs.extend_from_slice(&output[..card.outputs.len()]);
+        }
+    }
+    let lane = match &card.lane {
+        Some(layout) => {
+            let lane = feedback::Lane::new(layout, &model::Blob::new(&blob.0)).map_err(ExportError::Refused)?;
+            feedback::probe(&lane, 1.0 / card.timing.reference_rate_hz)
+        }
+        None => [0.0; model::MAX_AXES],
+    };
+    Ok((outputs, lane))
+}
+
+/// Header, card, padding, blob, check sum.
+fn assemble(card: &Card<'_>, blob: &[u8]) -> Result<Vec<u8>, ExportError> {
+    let card = postcard::to_allocvec(card).map_err(|_| ExportError::Refused(Refusal::Card))?;
+    let mut bytes = file::header(card.len() as u32, blob.len() as u32).to_vec();
+    bytes.extend(&card);
+    bytes.resize(bytes.len().next_multiple_of(file::ALIGNMENT), 0);
+    bytes.extend(blob);
+    let checksum = file::checksum(&bytes);
+    bytes[20..24].copy_from_slice(&checksum.to_le_bytes());
+    Ok(bytes)
+}
