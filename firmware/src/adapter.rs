@@ -76,6 +76,7 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
     feedback_weight: f32,
     correction: [f32; MAX_OUTPUTS],
     saturations: u32,
+    loop_gain: f32,
     scratch: Scratch,
 }
 
@@ -109,6 +110,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             feedback_weight: 0.0,
             correction: [0.0; MAX_OUTPUTS],
             saturations: 0,
+            loop_gain: 1.0,
             scratch: Scratch::new(),
         })
     }
@@ -121,6 +123,11 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     /// Switches lanes; they are faded in and out over the model's fade time.
     pub fn switch(&mut self, lanes: Lanes) {
         self.lanes = lanes;
+    }
+
+    /// Multiplies what the loop receives of the feedback lane, unknown to the lane: the loop gain of a robustness test. 1 in flight.
+    pub fn set_loop_gain(&mut self, gain: f32) {
+        self.loop_gain = gain;
     }
 
     /// Correction of each output of the model in the last tick.
@@ -252,7 +259,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         let axes = card.lane.iter().flat_map(|lane| &lane.axes);
         for (axis, value) in axes.clone().zip(feedback) {
             if let Some(wanted) = wanted.get_mut(usize::from(axis.output)) {
-                *wanted += value * self.feedback_weight;
+                *wanted += value * self.feedback_weight * self.loop_gain;
             }
         }
         let mut excess = [0.0; MAX_OUTPUTS];

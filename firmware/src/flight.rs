@@ -67,6 +67,7 @@ pub struct Flight<'m> {
     mixer: Mixer,
     wanted: ThrustVector,
     reference: Reference,
+    excitation: nalgebra::Vector3<f32>,
 }
 
 impl<'m> Flight<'m> {
@@ -82,6 +83,7 @@ impl<'m> Flight<'m> {
             mixer,
             wanted: ThrustVector { force: nalgebra::Vector3::zeros(), attitude: nalgebra::Matrix3::identity() },
             reference: Reference::default(),
+            excitation: nalgebra::Vector3::zeros(),
         })
     }
 
@@ -116,11 +118,20 @@ impl<'m> Flight<'m> {
         &self.reference
     }
 
+    /// Adds an offset, m, world ENU, to the position reference from the next reference tick on: the independent dither without which
+    /// the closed loop cannot be identified. Zero leaves every bit as it is.
+    pub fn excite(&mut self, offset: nalgebra::Vector3<f32>) {
+        self.excitation = offset;
+    }
+
     /// One control tick.
     pub fn step(&mut self, tick: Tick, state: &State) -> MotorCommand {
         if tick.0.is_multiple_of(self.position_divisor) {
             let reference_tick = (tick.0 / self.position_divisor) as i32;
             self.reference = self.adapted(reference_tick, state);
+            if self.excitation != nalgebra::Vector3::zeros() {
+                self.reference.position += self.excitation;
+            }
             self.wanted = self.position.step(&self.reference, state);
         }
         let (thrust, moment) = self.attitude.step(&self.wanted, state);

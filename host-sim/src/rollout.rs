@@ -1,0 +1,380 @@
+//! Closed-loop flights: eight at once through the plant, each with the firmware's own flight stack.
+//!
+//! *in* [`FlightPlan`]s; *out* a [`FlightRecord`] each; *never* a result that depends on the order of the plans, on the other flights
+//! or on the number of threads; *source* Zhou 2017, Fig. 1; rates of `impromptu_firmware::flight::Rates`.
+
+use impromptu_firmware::{
+    adapter::Lanes,
+    control::{Airframe, AttitudeGains, PositionGains},
+    flight::{Flight, PREVIEW, Rates, Settings},
+    model::Model,
+    types::{Setpoint, State as FirmwareState, Tick},
+};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rayon::prelude::*;
+
+use crate::{
+    condition::Condition,
+    flight_log::{FlightLog, LogRow},
+    plant::{LANES, Plant, State, States, Variation, Vehicle},
+    sensors::{DelayLine, Sensors},
+    trajectory::{Sample, Trajectory},
+    weather::Weather,
+};
+
+/// An independent excitation of the position reference: random signs, held for `hold_s`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dither {
+    /// Amplitude on each axis, m.
+    pub amplitude: f64,
+    /// Time between new signs, s.
+    pub hold_s: f64,
+}
+
+/// One flight to be flown.
+#[derive(Clone, Debug)]
+pub struct FlightPlan<'a> {
+    /// What is desired.
+    pub trajectory: &'a Trajectory,
+    /// The add-on, if any, and its lanes.
+    pub model: Option<(&'a Model<'a>, Lanes)>,
+    /// How the vehicle differs from its data.
+    pub variation: Variation,
+    /// Seed of noise, disturbance and dither.
+    pub seed: u64,
+    /// Dither on the position reference.
+    pub dither: Option<Dither>,
+    /// Gain on the feedback lane's output, unknown to it.
+    pub loop_gain: f32,
+    /// Whether every reference tick is logged.
+    pub log: bool,
+}
+
+impl<'a> FlightPlan<'a> {
+    /// A flight of the nominal vehicle without add-on, dither or log.
+    pub fn new(trajectory: &'a Trajectory, seed: u64) -> Self {
+        Self {
+            trajectory,
+            model: None,
+            variation: Variation::default(),
+            seed,
+            dither: None,
+            loop_gain: 1.0,
+            log: false,
+        }
+    }
+
+    /// The same flight with an add-on.
+    #[must_use]
+    pub fn with(self, model: &'a Model<'a>, lanes: Lanes) -> Self {
+        Self { model: Some((model, lanes)), ..self }
+    }
+}
+
+/// What came of a flight.
+#[derive(Clone, Debug, Default)]
+pub struct FlightRecord {
+    /// sqrt(mean |p_d - p|²) over the scored part, m, with the true position.
+    pub rms: f64,
+    /// Root mean square of the correction's position part on each axis over the scored part, m.
+    pub correction_rms: [f64; 3],
+    /// Every reference tick, if asked for.
+    pub log: Option<FlightLog>,
+}
+
+/// Why flights could not be flown.
+#[derive(Debug, thiserror::Error)]
+pub enum RolloutError {
+    /// The rotors cannot produce every moment.
+    #[error("vehicle `{0}`: its rotors cannot produce every moment; check rotor positions and directions")]
+    Airframe(String),
+    /// The firmware refuses the model.
+    #[error("model: {0}")]
+    Model(#[from] impromptu_firmware::model::Refusal),
+    /// A setting of the condition is impossible.
+    #[error("condition `{name}`: {reason}")]
+    Condition {
+        /// The condition.
+        name: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The trajectory is not sampled at the loop's rate.
+    #[error("trajectory `{name}` is sampled at {found} Hz, the position loop runs at {expected} Hz")]
+    Rate {
+        /// The trajectory.
+        name: String,
+        /// Its rate, Hz.
+        found: f64,
+        /// The loop's rate, Hz.
+        expected: f64,
+    },
+    /// Unknown gains.
+    #[error(transparent)]
+    Vehicle(#[from] crate::plant::VehicleError),
+}
+
+/// The firmware's settings for a vehicle with the position gains of that name.
+pub fn settings(vehicle: &Vehicle, gains: &str) -> Result<Settings, crate::plant::VehicleError> {
+    let position = vehicle.position_gains(gains)?;
+    let single = |values: [f64; 3]| values.map(|value| value as f32);
+    Ok(Settings {
+        airframe: Airframe {
+            mass: vehicle.mass as f32,
+            inertia: single([vehicle.inertia.xx, vehicle.inertia.yy, vehicle.inertia.zz]),
+            rotors: std::array::from_fn(|i| [vehicle.rotors[i].position[0] as f32, vehicle.rotors[i].position[1] as f32]),
+            directions: std::array::from_fn(|i| f32::from(vehicle.rotors[i].direction)),
+            thrust_coefficient: vehicle.thrust_coefficient as f32,
+            torque_coefficient: vehicle.torque_coefficient as f32,
+            max_rotor_speed: vehicle.rotor_speed_max as f32,
+        },
+        position: PositionGains {
+            kp: single(position.proportional),
+            kd: single(position.derivative),
+            ki: [0.0; 3],
+            integral_limit: 0.0,
+        },
+        attitude: AttitudeGains {
+            kp: vehicle.attitude_gains.proportional as f32,
+            kd: vehicle.attitude_gains.derivative as f32,
+        },
+        rates: Rates::default(),
+    })
+}
+
+/// A sample as the firmware's setpoint.
+pub fn setpoint(sample: &Sample) -> Setpoint {
+    let vector = |values: [f64; 3]| Vector3::from(values.map(|value| value as f32));
+    Setpoint {
+        position: vector(sample.position),
+        velocity: vector(sample.velocity),
+        acceleration: vector(sample.acceleration),
+        yaw: sample.yaw as f32,
+    }
+}
+
+/// Flies every plan under one condition; results in the plans' order. Groups of eight run on the threads of the current rayon pool.
+///
+/// # Errors
+/// The first plan that cannot be flown.
+pub fn fly(
+    vehicle: &Vehicle,
+    settings: &Settings,
+    condition: &Condition,
+    plans: &[FlightPlan<'_>],
+) -> Result<Vec<FlightRecord>, RolloutError> {
+    // Flights of like length share a group, so that few lanes idle.
+    let mut order: Vec<usize> = (0..plans.len()).collect();
+    order.sort_by_key(|&index| plans[index].trajectory.samples.len());
+    let groups: Vec<&[usize]> = order.chunks(LANES).collect();
+    let flown: Vec<Vec<(usize, FlightRecord)>> = groups
+        .par_iter()
+        .map(|group| {
+            let plans: Vec<&FlightPlan<'_>> = group.iter().map(|&index| &plans[index]).collect();
+            let records = Group::new(vehicle, settings, condition, &plans)?.fly();
+            Ok(group.iter().copied().zip(records).collect())
+        })
+        .collect::<Result<_, RolloutError>>()?;
+    let mut records = vec![FlightRecord::default(); plans.len()];
+    for (index, record) in flown.into_iter().flatten() {
+        records[index] = record;
+    }
+    Ok(records)
+}
+
+/// What one vehicle is told of where it is, and what is remembered of its flight.
+struct Pilot<'a> {
+    plan: FlightPlan<'a>,
+    flight: Flight<'a>,
+    sensors: Sensors,
+    late: DelayLine<([f64; 3], [f64; 3])>,
+    commands: DelayLine<[f64; 4]>,
+    dither: Option<(Dither, Xoshiro256PlusPlus)>,
+    known: FirmwareState,
+    squares: f64,
+    correction_squares: [f64; 3],
+    rows: Vec<LogRow>,
+}
+
+/// Flights that run in step.
+struct Group<'a> {
+    plant: Plant,
+    states: States,
+    weather: Weather,
+    pilots: Vec<Pilot<'a>>,
+    rates: Rates,
+    rotor_speed_max: f64,
+}
+
+impl<'a> Group<'a> {
+    fn new(vehicle: &Vehicle, settings: &Settings, condition: &Condition, plans: &[&FlightPlan<'a>]) -> Result<Self, RolloutError> {
+        let rates = settings.rates;
+        let tick = 1.0 / f64::from(rates.control_hz);
+        let mut variations = [Variation::default(); LANES];
+        let mut seeds = [0; LANES];
+        let mut states = States::splat(&State::at_rest([0.0; 3]));
+        let mut pilots = Vec::with_capacity(LANES);
+        for (lane, plan) in plans.iter().enumerate() {
+            variations[lane] = plan.variation;
+            seeds[lane] = plan.seed;
+            let pilot = Pilot::new(vehicle, settings, condition, (*plan).clone(), tick)?;
+            let hover = plan.variation.payload_factor * vehicle.mass * crate::plant::GRAVITY
+                / (4.0 * vehicle.thrust_coefficient * plan.variation.thrust_factor);
+            let mut state = State::at_rest(plan.trajectory.samples[0].position);
+            let half_yaw = 0.5 * plan.trajectory.samples[0].yaw;
+            state.attitude = [half_yaw.cos(), 0.0, 0.0, half_yaw.sin()];
+            state.rotor_speeds = [hover.sqrt(); 4];
+            states.set_lane(lane, &state);
+            pilots.push(pilot);
+        }
+        let weather = Weather::new(&condition.weather, tick, seeds).map_err(|error| RolloutError::Condition {
+            name: condition.name.clone(),
+            reason: error.to_string(),
+        })?;
+        Ok(Self {
+            plant: Plant::new(vehicle, variations),
+            states,
+            weather,
+            pilots,
+            rates,
+            rotor_speed_max: vehicle.rotor_speed_max,
+        })
+    }
+
+    fn fly(mut self) -> Vec<FlightRecord> {
+        let divisor = self.rates.position_divisor as usize;
+        let duration = 1.0 / f64::from(self.rates.control_hz);
+        let ticks = self.pilots.iter().map(|pilot| pilot.plan.trajectory.samples.len()).max().unwrap_or(0) * divisor;
+        let mut commands = [[0.0; LANES]; 4];
+        for tick in 0..ticks {
+            for (lane, pilot) in self.pilots.iter_mut().enumerate() {
+                let state = self.states.lane(lane);
+                let fractions = pilot.step(tick, divisor, &state);
+                for (command, fraction) in commands.iter_mut().zip(fractions) {
+                    command[lane] = fraction * self.rotor_speed_max;
+                }
+            }
+            self.plant.step(&mut self.states, &commands, self.weather.now(), duration);
+            self.weather.advance();
+        }
+        self.pilots.into_iter().map(Pilot::finish).collect()
+    }
+}
+
+impl<'a> Pilot<'a> {
+    fn new(
+        vehicle: &Vehicle,
+        settings: &Settings,
+        condition: &Condition,
+        plan: FlightPlan<'a>,
+        tick: f64,
+    ) -> Result<Self, RolloutError> {
+        let refuse = |reason: String| RolloutError::Condition { name: condition.name.clone(), reason };
+        let expected = f64::from(settings.rates.reference_hz());
+        if (plan.trajectory.rate_hz - expected).abs() > 1e-6 * expected {
+            return Err(RolloutError::Rate { name: plan.trajectory.name.clone(), found: plan.trajectory.rate_hz, expected });
+        }
+        let ticks = |seconds: f64| (seconds / tick).round() as usize;
+        let mut flight = Flight::new(settings).ok_or_else(|| RolloutError::Airframe(vehicle.name.clone()))?;
+        if let Some((model, lanes)) = plan.model {
+            flight.attach(model, settings, lanes)?;
+            if let Some(adapter) = flight.adapter() {
+                adapter.set_loop_gain(plan.loop_gain);
+            }
+        }
+        for sample in plan.trajectory.samples.iter().take(PREVIEW / 2 + PREVIEW / 4) {
+            flight.push_setpoint(&setpoint(sample));
+        }
+        Ok(Self {
+            flight,
+            sensors: Sensors::new(&condition.noise, plan.seed).map_err(|error| refuse(error.to_string()))?,
+            late: DelayLine::new(ticks(condition.measurement_delay_s)).map_err(|error| refuse(error.to_string()))?,
+            commands: DelayLine::new(ticks(condition.command_delay_s)).map_err(|error| refuse(error.to_string()))?,
+            dither: plan.dither.map(|dither| (dither, Xoshiro256PlusPlus::seed_from_u64(plan.seed ^ 0x9b05_688c_2b3e_6c1f))),
+            known: FirmwareState::default(),
+            squares: 0.0,
+            correction_squares: [0.0; 3],
+            rows: Vec::new(),
+            plan,
+        })
+    }
+
+    /// One control tick: what the loop is told, what it commands, what is logged.
+    fn step(&mut self, tick: usize, divisor: usize, state: &State) -> [f64; 4] {
+        let (position, velocity) = self.late.push((state.position, state.velocity));
+        let (attitude, rates) = self.sensors.attitude_and_body_rates(state);
+        let [w, x, y, z] = attitude.map(|value| value as f32);
+        self.known.attitude = UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z));
+        self.known.rates = Vector3::from(rates.map(|value| value as f32));
+        let reference_tick = tick / divisor;
+        if tick.is_multiple_of(divisor) {
+            let seen = State { position, velocity, ..*state };
+            let (position, velocity) = self.sensors.position_and_velocity(&seen);
+            self.known.position = Vector3::from(position.map(|value| value as f32));
+            self.known.velocity = Vector3::from(velocity.map(|value| value as f32));
+            let next = self.flight.next_setpoint() as usize;
+            if let Some(sample) = self.plan.trajectory.samples.get(next) {
+                self.flight.push_setpoint(&setpoint(sample));
+            }
+            self.dither(reference_tick);
+        }
+        let command = self.flight.step(Tick(tick as u32), &self.known);
+        if tick.is_multiple_of(divisor) {
+            self.score(reference_tick, state);
+        }
+        self.commands.push(command.fractions().map(f64::from))
+    }
+
+    fn dither(&mut self, reference_tick: usize) {
+        let Some((dither, random)) = &mut self.dither else { return };
+        let hold = ((dither.hold_s * self.plan.trajectory.rate_hz).round() as usize).max(1);
+        if reference_tick.is_multiple_of(hold) {
+            let bits = random.random::<u64>();
+            let sign = |bit: u32| if (bits >> bit) & 1 == 1 { dither.amplitude } else { -dither.amplitude };
+            self.flight.excite(Vector3::new(sign(60) as f32, sign(61) as f32, sign(62) as f32));
+        }
+    }
+
+    fn score(&mut self, reference_tick: usize, state: &State) {
+        let trajectory = self.plan.trajectory;
+        let Some(desired) = trajectory.samples.get(reference_tick) else { return };
+        let reference = self.flight.reference();
+        if trajectory.scored.contains(&reference_tick) {
+            for axis in 0..3 {
+                let error = desired.position[axis] - state.position[axis];
+                self.squares += error * error;
+                let correction = f64::from(reference.position[axis]) - desired.position[axis];
+                self.correction_squares[axis] += correction * correction;
+            }
+        }
+        if self.plan.log {
+            self.rows.push(LogRow {
+                time: reference_tick as f64 / trajectory.rate_hz,
+                desired: *desired,
+                reference_position: reference.position.map(f64::from).into(),
+                reference_velocity: reference.velocity.map(f64::from).into(),
+                measured_position: self.known.position.map(f64::from).into(),
+                measured_velocity: self.known.velocity.map(f64::from).into(),
+                true_position: Some(state.position),
+            });
+        }
+    }
+
+    fn finish(self) -> FlightRecord {
+        let scored = self.plan.trajectory.scored.len().max(1) as f64;
+        let rms = (self.squares / scored).sqrt();
+        FlightRecord {
+            // A flight that left the numbers is as bad as can be, not "not a number".
+            rms: if rms.is_finite() { rms } else { f64::INFINITY },
+            correction_rms: self.correction_squares.map(|sum| (sum / scored).sqrt()),
+            log: self.plan.log.then(|| FlightLog {
+                name: self.plan.trajectory.name.clone(),
+                rate_hz: self.plan.trajectory.rate_hz,
+                scored: self.plan.trajectory.scored.clone(),
+                rows: self.rows,
+            }),
+        }
+    }
+}
