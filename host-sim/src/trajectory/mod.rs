@@ -19,6 +19,7 @@ mod pen;
 mod piecewise;
 mod random_spline;
 mod rows;
+mod scribble;
 mod segments;
 mod shapes;
 mod smoothing_spline;

@@ -68,7 +68,8 @@ fn controls(path: &[[f64; 3]], pace: Pace) -> Vec<[f64; 3]> {
     }
     let last = points.len() - 1;
     let sigma = HAND_SECONDS / CONTROL_SECONDS;
-    let padding = (3.0 * sigma).ceil() as usize + 3;
+    // Smoothing reaches three sigma; beyond it the spline needs five equal control points to rest exactly.
+    let padding = (3.0 * sigma).ceil() as usize + 4;
     let count = (times[last] / CONTROL_SECONDS).ceil() as usize;
     let mut timed = vec![points[0]; padding];
     let mut index = 0;
