@@ -158,7 +158,7 @@ pub fn star(points: u32, radius: f64, inner: f64, pace: Pace) -> Motion {
     );
     let corner = |index: u32| {
         let angle = TAU * f64::from(index) / f64::from(2 * points);
-        let reach = if index % 2 == 0 {
+        let reach = if index.is_multiple_of(2) {
             radius
         } else {
             radius * inner
