@@ -5,3 +5,4 @@
 
 
 pub mod trajectory;
+pub mod feedback_design;
