@@ -6,3 +6,4 @@
 
 pub mod trajectory;
 pub mod feedback_design;
+pub mod report;

@@ -1,0 +1,131 @@
+//! The table on the console: a line for each case, a column for each method, readable at 130 columns.
+
+use super::cases::{Case, flights_in_words, methods};
+use super::method::Method;
+use super::notation::{NOT_AVAILABLE, centimetres_with_unit, mean_and_worst, speed};
+use super::results::{Results, Row};
+use comfy_table::{Cell, CellAlignment, ContentArrangement, Table, presets};
+use std::fmt::Write as _;
+
+/// The table with its legend, as plain text that ends with a line break.
+#[must_use]
+pub fn console_table(results: &Results) -> String {
+    let cases = Case::group(&results.table);
+    let methods = methods(&results.table);
+    let mut text = format!("{}\n", results.title);
+    if cases.is_empty() {
+        text.push_str("No flights: the table is empty.\n");
+        return text;
+    }
+    let several_seeds = cases.iter().any(|case| case.seed != cases[0].seed);
+
+    let mut table = Table::new();
+    table
+        .load_style(presets::UTF8_HORIZONTAL_ONLY)
+        .set_content_arrangement(ContentArrangement::Disabled)
+        .set_header(
+            std::iter::once(Cell::new("vehicle, gains\ncondition, speed")).chain(
+                methods
+                    .iter()
+                    .map(|method| right(method.heading().join("\n").trim_end())),
+            ),
+        );
+    for case in &cases {
+        let mut name = format!(
+            "{} {}\n{} {}",
+            case.vehicle,
+            case.gains,
+            case.condition,
+            speed(case.speed)
+        );
+        if several_seeds {
+            let _ = write!(name, " seed {}", case.seed);
+        }
+        table.add_row(
+            std::iter::once(Cell::new(name))
+                .chain(methods.iter().map(|method| right(&cell(case.row(*method))))),
+        );
+    }
+    for column in table.column_iter_mut() {
+        column.set_padding((0, 1));
+    }
+    text.push_str(&table.trim_fmt());
+    text.push('\n');
+    text.push_str(&legend(results, &cases));
+    text
+}
+
+fn right(text: &str) -> Cell {
+    Cell::new(text).set_alignment(CellAlignment::Right)
+}
+
+fn cell(row: Option<&Row>) -> String {
+    match row {
+        None => NOT_AVAILABLE.to_owned(),
+        Some(row) if row.method == Method::Baseline => centimetres_with_unit(row.rms_cm_mean),
+        Some(row) => format!(
+            "{}\n{}",
+            centimetres_with_unit(row.rms_cm_mean),
+            mean_and_worst(row.reduction_mean, row.reduction_worst, "/")
+        ),
+    }
+}
+
+fn legend(results: &Results, cases: &[Case<'_>]) -> String {
+    let flights = flights_in_words(cases, &results.per_flight).map_or_else(
+        || "over all flights".to_owned(),
+        |count| format!("over {count} flights of unseen trajectories"),
+    );
+    let mut text = format!(
+        "\
+Each cell, {flights}: mean RMS position error in cm; below it the reduction of that error in %, mean/worst flight.
+  RMS of one flight = sqrt(mean |desired - flown|^2) over the scored part, true position, three axes together.
+  Reduction of one flight = 100 (1 - RMS / RMS of the baseline over the same trajectory); below 0 it is worse than the baseline.
+  flatness: desired acceleration / kp added to the reference.  lane: feedback lane.  net: network lane.  ridge: linear, same features.
+  Last column = what is flashed. Speed multiplies the drawn speed; +20ms: 20 ms more delay in the whole loop at test time only.
+"
+    );
+    let _ = writeln!(
+        text,
+        "Seed {}, version {}. Again: {}",
+        results.seed, results.software_version, results.command
+    );
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture;
+    use super::*;
+
+    #[test]
+    fn small_table_is_printed_as_agreed() {
+        let text = console_table(&fixture::small());
+        let expected = "\
+";
+        assert_eq!(text, expected, "got:\n{text}");
+    }
+
+    #[test]
+    fn all_methods_fit_into_132_columns() {
+        let text = console_table(&fixture::full());
+        let widest = text
+            .lines()
+            .max_by_key(|line| line.chars().count())
+            .unwrap();
+        assert!(
+            widest.chars().count() <= 132,
+            "{} columns: {widest}",
+            widest.chars().count()
+        );
+    }
+
+    #[test]
+    fn nothing_and_not_a_number_are_shown_not_hidden() {
+        let mut results = fixture::small();
+        results.table[1].rms_cm_mean = f64::NAN;
+        results.table[1].reduction_mean = f64::INFINITY;
+        assert!(console_table(&results).contains("n/a"));
+        assert!(console_table(&fixture::empty()).contains("the table is empty"));
+    }
+}
