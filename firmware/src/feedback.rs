@@ -115,9 +115,9 @@ impl AxisState {
         let bounded = clamp(fast, -layout.fast_limit, layout.fast_limit);
         self.clamped = bounded != fast;
         let increment = self.errors[0][0] * dt;
-        let pushes_on = increment * axis.slow_gain;
-        let winds_up = (self.clamped && pushes_on * fast > 0.0)
-            || (abs(axis.slow_gain * (self.integral + increment)) > layout.integral_limit && pushes_on * slow > 0.0);
+        // Only its own clamp stops the integral: a constant disturbance larger than the fast clamp must still be absorbed.
+        let winds_up =
+            abs(axis.slow_gain * (self.integral + increment)) > layout.integral_limit && increment * self.integral > 0.0;
         if engaged && !winds_up {
             self.integral += increment;
         }

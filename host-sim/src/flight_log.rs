@@ -118,7 +118,6 @@ const LONGEST_GAP: f64 = 0.1;
 /// Fewest rows of a log.
 const FEWEST_ROWS: usize = 50;
 
-
 fn names(signal: &str, derivative: &str, unit: &str) -> [String; 3] {
     ["x", "y", "z"].map(|axis| format!("{signal}_{derivative}{axis}_{unit}"))
 }

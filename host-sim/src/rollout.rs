@@ -55,15 +55,7 @@ pub struct FlightPlan<'a> {
 impl<'a> FlightPlan<'a> {
     /// A flight of the nominal vehicle without add-on, dither or log.
     pub fn new(trajectory: &'a Trajectory, seed: u64) -> Self {
-        Self {
-            trajectory,
-            model: None,
-            variation: Variation::default(),
-            seed,
-            dither: None,
-            loop_gain: 1.0,
-            log: false,
-        }
+        Self { trajectory, model: None, variation: Variation::default(), seed, dither: None, loop_gain: 1.0, log: false }
     }
 
     /// The same flight with an add-on.
@@ -136,10 +128,7 @@ pub fn settings(vehicle: &Vehicle, gains: &str) -> Result<Settings, crate::plant
             ki: [0.0; 3],
             integral_limit: 0.0,
         },
-        attitude: AttitudeGains {
-            kp: vehicle.attitude_gains.proportional as f32,
-            kd: vehicle.attitude_gains.derivative as f32,
-        },
+        attitude: AttitudeGains { kp: vehicle.attitude_gains.proportional as f32, kd: vehicle.attitude_gains.derivative as f32 },
         rates: Rates::default(),
     })
 }
@@ -209,7 +198,12 @@ struct Group<'a> {
 }
 
 impl<'a> Group<'a> {
-    fn new(vehicle: &Vehicle, settings: &Settings, condition: &Condition, plans: &[&FlightPlan<'a>]) -> Result<Self, RolloutError> {
+    fn new(
+        vehicle: &Vehicle,
+        settings: &Settings,
+        condition: &Condition,
+        plans: &[&FlightPlan<'a>],
+    ) -> Result<Self, RolloutError> {
         let rates = settings.rates;
         let tick = 1.0 / f64::from(rates.control_hz);
         let mut variations = [Variation::default(); LANES];
@@ -229,10 +223,8 @@ impl<'a> Group<'a> {
             states.set_lane(lane, &state);
             pilots.push(pilot);
         }
-        let weather = Weather::new(&condition.weather, tick, seeds).map_err(|error| RolloutError::Condition {
-            name: condition.name.clone(),
-            reason: error.to_string(),
-        })?;
+        let weather = Weather::new(&condition.weather, tick, seeds)
+            .map_err(|error| RolloutError::Condition { name: condition.name.clone(), reason: error.to_string() })?;
         Ok(Self {
             plant: Plant::new(vehicle, variations),
             states,
