@@ -1,16 +1,22 @@
 #!/bin/sh
 # Makes a toolchain with the microcontroller's target out of Debian's or Ubuntu's packages, where rustup cannot provide it.
 # It is not linked anywhere: the tests find it through IMPROMPTU_THUMB_TOOLCHAIN. About 30 s and 60 MB, once.
-# usage: tests/thumb-toolchain.sh FOLDER
+# usage: tests/thumb-toolchain.sh FOLDER     makes it
+#        tests/thumb-toolchain.sh --packages lists the packages that must be installed before
 set -eu
+# The linker belongs to the compiler's LLVM, whose version stands only in the packages' dependencies.
+llvm=$(apt-cache depends rust-web-llvm | sed -n 's/.*Depends: llvm-\([0-9]*\)$/\1/p')
+packages="rustc-web cargo-web rust-web-src rust-web-clippy lld-$llvm"
+[ "${1:-}" != --packages ] || { echo "$packages"; exit; }
 folder=$(realpath -m "${1:?usage: $0 FOLDER}")
 target=thumbv7em-none-eabihf
-packages="rustc-web cargo-web rust-web-src rust-web-clippy rust-web-llvm lld-22 llvm-22"
 source=/usr/lib/rustlib/src/rust
 
 fail() { echo "thumb-toolchain: $1" >&2; exit 1; }
-[ -x /usr/bin/rustc ] && [ -x /usr/bin/cargo ] && [ -e $source/library/core/src/lib.rs ] ||
-    fail "the distribution's compiler or its sources are missing; run: sudo apt-get install $packages"
+linker=/usr/lib/llvm-$llvm/bin/lld
+for file in /usr/bin/rustc /usr/bin/cargo $source/library/core/src/lib.rs "$linker"; do
+    [ -e "$file" ] || fail "$file is missing; run: sudo apt-get install $packages"
+done
 
 # `core` is compiled by the compiler that it belongs to; another version would refuse it.
 host=$(/usr/bin/rustc -vV | sed -n 's/^host: //p')
@@ -33,9 +39,7 @@ mkdir -p "$folder/bin" "$folder/lib/rustlib/$target/lib" "$folder/lib/rustlib/$h
 cp "$work/built/$target"/release/deps/lib*.rlib "$folder/lib/rustlib/$target/lib/"
 rm -f "$folder/lib/rustlib/$target/lib"/libempty-*
 ln -s /usr/lib/rustlib/$host/lib "$folder/lib/rustlib/$host/lib"
-llvm=/usr/lib/llvm-$(/usr/bin/rustc -vV | sed -n 's/^LLVM version: \([0-9]*\).*/\1/p')/bin
-[ -x "$llvm/lld" ] || fail "$llvm/lld is missing; run: sudo apt-get install $packages"
-ln -s "$llvm/lld" "$folder/lib/rustlib/$host/bin/rust-lld"
+ln -s "$linker" "$folder/lib/rustlib/$host/bin/rust-lld"
 for program in rustc rustdoc clippy-driver; do
     [ -x /usr/bin/$program ] || continue
     printf '#!/bin/sh\nexec /usr/bin/%s "$@" --sysroot "%s"\n' $program "$folder" > "$folder/bin/$program"
