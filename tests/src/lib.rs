@@ -1,1 +1,3 @@
-//! The promises of the project live in `tests/`; this library is empty.
+//! What the promises need to be tested: the emulated microcontroller. The promises themselves are in `tests/`.
+
+pub mod emulator;

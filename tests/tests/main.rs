@@ -1,1 +1,3 @@
 //! Table of contents of the promises.
+
+mod emulator;
