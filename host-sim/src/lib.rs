@@ -3,7 +3,14 @@
 //!
 //! SI units; world frame ENU (z up), body frame FLU, Hamilton quaternion body to world; f64 here, f32 in the firmware.
 
-
-pub mod trajectory;
+pub mod condition;
+pub mod examples;
 pub mod feedback_design;
+pub mod flight_log;
+pub mod plant;
 pub mod report;
+pub mod rollout;
+pub mod sensors;
+pub mod training;
+pub mod trajectory;
+pub mod weather;

@@ -65,8 +65,5 @@ pub(super) fn reference_response(model: &ArxModel, z: Complex<f64>) -> [Complex<
     let [vp, vv, vr] = row(&model.velocity);
     let (pp, vv) = (z - pp, z - vv);
     let determinant = pp * vv - pv * vp;
-    [
-        (pr * vv + pv * vr) / determinant,
-        (pp * vr + vp * pr) / determinant,
-    ]
+    [(pr * vv + pv * vr) / determinant, (pp * vr + vp * pr) / determinant]
 }

@@ -36,23 +36,13 @@ const STRETCH: usize = 200;
 /// Relative ridge of the prediction: far below any excitation (1e-6 of the reference's own size), far above rounding.
 const RIDGE: f64 = 1e-12;
 
-pub(super) fn measure(
-    logs: &[AxisLog],
-    columns: Columns,
-    products: &DMatrix<f64>,
-) -> Result<Excitation, DesignRefusal> {
+pub(super) fn measure(logs: &[AxisLog], columns: Columns, products: &DMatrix<f64>) -> Result<Excitation, DesignRefusal> {
     let newest = columns.reference_position(0);
-    let others: Vec<usize> = (0..columns.regressors())
-        .filter(|&index| index != newest)
-        .collect();
+    let others: Vec<usize> = (0..columns.regressors()).filter(|&index| index != newest).collect();
     let sums = products.select_rows(&others).select_columns(&others);
-    let target = DVector::from_iterator(
-        others.len(),
-        others.iter().map(|&index| products[(index, newest)]),
-    );
-    let coefficients = ScaledCholesky::new(&sums, RIDGE)
-        .ok_or(DesignRefusal::SingularRegression { lags: columns.lags })?
-        .solve(&target);
+    let target = DVector::from_iterator(others.len(), others.iter().map(|&index| products[(index, newest)]));
+    let coefficients =
+        ScaledCholesky::new(&sums, RIDGE).ok_or(DesignRefusal::SingularRegression { lags: columns.lags })?.solve(&target);
     let mut predictor = DVector::zeros(columns.regressors() + 2);
     predictor[newest] = 1.0;
     for (&index, coefficient) in others.iter().zip(&coefficients) {
@@ -93,15 +83,10 @@ impl Excitation {
     pub fn require(&self, minimum: f64) -> Result<(), DesignRefusal> {
         // Written so that a value that is not a number is refused as well.
         if !matches!(self.innovation.partial_cmp(&minimum), Some(order) if order.is_ge()) {
-            return Err(DesignRefusal::NoExcitation {
-                innovation: self.innovation,
-                minimum,
-            });
+            return Err(DesignRefusal::NoExcitation { innovation: self.innovation, minimum });
         }
         match self.dither_share {
-            Some(share) if !(0.3..=3.0).contains(&share) => {
-                Err(DesignRefusal::DitherNotInReference { share })
-            }
+            Some(share) if !(0.3..=3.0).contains(&share) => Err(DesignRefusal::DitherNotInReference { share }),
             _ => Ok(()),
         }
     }

@@ -170,12 +170,7 @@ impl IdentificationData {
             return Err(DesignRefusal::TooFewRows { rows, needed });
         }
         let excitation = excitation::measure(logs, columns, &products)?;
-        Ok(Self {
-            columns,
-            rows,
-            products,
-            excitation,
-        })
+        Ok(Self { columns, rows, products, excitation })
     }
 
     /// Rows (ticks with a full past) that were collected.
@@ -199,36 +194,20 @@ impl IdentificationData {
     /// The sums are those which infinitely many noisy copies of the logs would give. The newest position is the origin of
     /// its row: its noise moves every position and position reference of the row together, hence the full block rather
     /// than a diagonal. `regularisation` is relative to each regressor's own power.
-    pub fn fit(
-        &self,
-        lags: usize,
-        added_noise: [f64; 2],
-        regularisation: f64,
-    ) -> Result<ArxModel, DesignRefusal> {
+    pub fn fit(&self, lags: usize, added_noise: [f64; 2], regularisation: f64) -> Result<ArxModel, DesignRefusal> {
         if !(2..=self.columns.lags).contains(&lags) {
-            return Err(DesignRefusal::setting(
-                "lags",
-                "between 2 and the lags collected",
-            ));
+            return Err(DesignRefusal::setting("lags", "between 2 and the lags collected"));
         }
         let columns = Columns { lags };
         let selection = self.columns.selection(lags);
-        let sums = self
-            .products
-            .select_rows(&selection)
-            .select_columns(&selection);
+        let sums = self.products.select_rows(&selection).select_columns(&selection);
         let count = columns.regressors();
         let plain = sums.view((0, 0), (count, count)).into_owned();
         let targets = sums.view((0, count), (count, 2)).into_owned();
 
-        let [position_power, velocity_power] =
-            added_noise.map(|noise| self.rows as f64 * noise * noise);
+        let [position_power, velocity_power] = added_noise.map(|noise| self.rows as f64 * noise * noise);
         let positions: Vec<usize> = (1..lags).map(|lag| columns.position(lag)).collect();
-        let moved: Vec<usize> = positions
-            .iter()
-            .copied()
-            .chain((0..lags).map(|lag| columns.reference_position(lag)))
-            .collect();
+        let moved: Vec<usize> = positions.iter().copied().chain((0..lags).map(|lag| columns.reference_position(lag))).collect();
         let mut noisy = plain.clone();
         let mut noisy_targets = targets.clone();
         for &row in &moved {
@@ -245,24 +224,18 @@ impl IdentificationData {
             noisy[(index, index)] += velocity_power;
         }
 
-        let solver = ScaledCholesky::new(&noisy, regularisation)
-            .ok_or(DesignRefusal::SingularRegression { lags })?;
+        let solver = ScaledCholesky::new(&noisy, regularisation).ok_or(DesignRefusal::SingularRegression { lags })?;
         let mut residual = [0.0; 2];
         let mut solve = |output: usize| {
             let coefficients = solver.solve(&noisy_targets.column(output).into_owned());
             let explained = coefficients.dot(&targets.column(output));
-            let power = sums[(count + output, count + output)] - 2.0 * explained
-                + coefficients.dot(&(&plain * &coefficients));
+            let power = sums[(count + output, count + output)] - 2.0 * explained + coefficients.dot(&(&plain * &coefficients));
             residual[output] = (power / self.rows as f64).max(0.0).sqrt();
             coefficients
         };
         let position = equation(columns, &solve(0), 1.0);
         let velocity = equation(columns, &solve(1), 0.0);
-        Ok(ArxModel {
-            position,
-            velocity,
-            residual,
-        })
+        Ok(ArxModel { position, velocity, residual })
     }
 }
 
@@ -293,19 +266,10 @@ fn check(index: usize, log: &AxisLog) -> Result<(), DesignRefusal> {
     ];
     for (signal, values) in signals {
         if values.len() != length {
-            return Err(DesignRefusal::UnequalLengths {
-                log: index,
-                signal,
-                length: values.len(),
-                expected: length,
-            });
+            return Err(DesignRefusal::UnequalLengths { log: index, signal, length: values.len(), expected: length });
         }
         if let Some(tick) = values.iter().position(|value| !value.is_finite()) {
-            return Err(DesignRefusal::NotFinite {
-                log: index,
-                signal,
-                tick,
-            });
+            return Err(DesignRefusal::NotFinite { log: index, signal, tick });
         }
     }
     Ok(())

@@ -26,20 +26,14 @@ pub struct LaneGain {
 impl LaneGain {
     /// Proportional-derivative feedback on the position reference, the one-lag case: `u = -(kp e_p + kd e_v)`, `kd` in s.
     pub fn pd(kp: f64, kd: f64) -> Self {
-        Self {
-            error_coefficients: vec![[-kp, -kd]],
-            past_output_coefficients: Vec::new(),
-            integral_coefficient: 0.0,
-        }
+        Self { error_coefficients: vec![[-kp, -kd]], past_output_coefficients: Vec::new(), integral_coefficient: 0.0 }
     }
 
     /// From a gain of `u = -gain x` on a state as [`super::error_model::ErrorModel`] orders it.
     pub(super) fn from_state_feedback(gain: &RowDVector<f64>, lags: usize) -> Self {
         let negative = |first: usize, index: usize| -gain[first + index];
         Self {
-            error_coefficients: (0..lags)
-                .map(|lag| [negative(0, lag), negative(lags, lag)])
-                .collect(),
+            error_coefficients: (0..lags).map(|lag| [negative(0, lag), negative(lags, lag)]).collect(),
             past_output_coefficients: (0..lags - 1).map(|lag| negative(2 * lags, lag)).collect(),
             integral_coefficient: negative(3 * lags - 1, 0),
         }
@@ -61,9 +55,7 @@ impl LaneGain {
 
     /// Ticks that the lane looks back, the present one included.
     pub fn lags(&self) -> usize {
-        self.error_coefficients
-            .len()
-            .max(self.past_output_coefficients.len() + 1)
+        self.error_coefficients.len().max(self.past_output_coefficients.len() + 1)
     }
 
     /// Stored numbers, which are the multiply-adds of one tick.
@@ -97,12 +89,7 @@ impl LaneGain {
     pub(super) fn response(&self, z: Complex<f64>, tick: f64) -> [Complex<f64>; 2] {
         let delay = z.inv();
         let sum = |channel: usize| {
-            self.error_coefficients
-                .iter()
-                .rev()
-                .fold(Complex::new(0.0, 0.0), |sum, pair| {
-                    sum * delay + pair[channel]
-                })
+            self.error_coefficients.iter().rev().fold(Complex::new(0.0, 0.0), |sum, pair| sum * delay + pair[channel])
         };
         let past = polynomial(&self.past_output_coefficients, delay) * delay;
         let mut position = sum(0);
@@ -115,12 +102,7 @@ impl LaneGain {
 
 /// `sum coefficients[i] delay^i`.
 pub(super) fn polynomial(coefficients: &[f64], delay: Complex<f64>) -> Complex<f64> {
-    coefficients
-        .iter()
-        .rev()
-        .fold(Complex::new(0.0, 0.0), |sum, coefficient| {
-            sum * delay + coefficient
-        })
+    coefficients.iter().rev().fold(Complex::new(0.0, 0.0), |sum, coefficient| sum * delay + coefficient)
 }
 
 #[cfg(test)]
@@ -136,15 +118,10 @@ mod tests {
         assert_eq!(lane.integral_coefficient, -12.0);
         assert_eq!(lane.state_feedback(4), gain);
         assert_eq!(lane.coefficient_count(), 12);
-        let stored = [
-            -1.0, -2.0, -3.0, -4.0, -5.0, -6.0, -7.0, -8.0, -9.0, -10.0, -11.0, 0.0,
-        ];
+        let stored = [-1.0, -2.0, -3.0, -4.0, -5.0, -6.0, -7.0, -8.0, -9.0, -10.0, -11.0, 0.0];
         assert_eq!(lane.stored_coefficients(), stored);
         assert_eq!(lane.steady_integral_coefficient(), -12.0 / 31.0);
-        assert_eq!(
-            LaneGain::pd(1.0, 0.4).stored_coefficients(),
-            [-1.0, -0.4, 0.0]
-        );
+        assert_eq!(LaneGain::pd(1.0, 0.4).stored_coefficients(), [-1.0, -0.4, 0.0]);
     }
 
     #[test]
@@ -153,10 +130,7 @@ mod tests {
         assert_eq!(lane.lags(), 1);
         for angle in [0.01_f64, 1.0, 3.0] {
             let [position, velocity] = lane.response(Complex::from_polar(1.0, angle), 0.01);
-            assert_eq!(
-                (position, velocity),
-                (Complex::new(-1.0, 0.0), Complex::new(-0.4, 0.0))
-            );
+            assert_eq!((position, velocity), (Complex::new(-1.0, 0.0), Complex::new(-0.4, 0.0)));
         }
     }
 }

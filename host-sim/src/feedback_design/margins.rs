@@ -53,20 +53,12 @@ pub fn assess(model: &ArxModel, lane: &LaneGain, tick: f64) -> LoopAssessment {
     }
     let spectral_radius = spectral_radius(&closed);
     let transfer = |z| loop_transfer(model, lane, z, tick);
-    LoopAssessment {
-        spectral_radius,
-        margins: (spectral_radius < 1.0).then(|| margins_of(transfer, tick)),
-    }
+    LoopAssessment { spectral_radius, margins: (spectral_radius < 1.0).then(|| margins_of(transfer, tick)) }
 }
 
 /// Transfer function of the loop opened at the add-on's output, in the sign convention of a characteristic
 /// equation `1 + L = 0`.
-pub fn loop_transfer(
-    model: &ArxModel,
-    lane: &LaneGain,
-    z: Complex<f64>,
-    tick: f64,
-) -> Complex<f64> {
+pub fn loop_transfer(model: &ArxModel, lane: &LaneGain, z: Complex<f64>, tick: f64) -> Complex<f64> {
     let [position, velocity] = reference_response(model, z);
     let [from_position, from_velocity] = lane.response(z, tick);
     -(from_position * position + from_velocity * velocity)
@@ -102,9 +94,7 @@ pub fn margins_of(transfer: impl Fn(Complex<f64>) -> Complex<f64>, tick: f64) ->
             }
         }
         let distance = (1.0 + after).norm();
-        let next = grid
-            .get(index + 2)
-            .map_or(f64::INFINITY, |point| (1.0 + point.1).norm());
+        let next = grid.get(index + 2).map_or(f64::INFINITY, |point| (1.0 + point.1).norm());
         if distance <= (1.0 + before).norm() && distance <= next {
             let end = grid.get(index + 2).map_or(highest, |point| point.0);
             modulus = modulus.min(smallest(|frequency| (1.0 + at(frequency)).norm(), low, end));
@@ -115,10 +105,7 @@ pub fn margins_of(transfer: impl Fn(Complex<f64>) -> Complex<f64>, tick: f64) ->
     let lower_end = transfer(Complex::new(1.0, 0.0)).re;
     real_crossings.extend([lower_end, grid[GRID_POINTS].1.re]);
 
-    let factors = real_crossings
-        .into_iter()
-        .filter(|real| *real < 0.0 && real.is_finite())
-        .map(|real| -1.0 / real);
+    let factors = real_crossings.into_iter().filter(|real| *real < 0.0 && real.is_finite()).map(|real| -1.0 / real);
     let mut phase: Option<f64> = None;
     let mut delay: Option<f64> = None;
     for &frequency in &crossovers {
@@ -130,13 +117,8 @@ pub fn margins_of(transfer: impl Fn(Complex<f64>) -> Complex<f64>, tick: f64) ->
         delay = Some(delay.map_or(time, |least| least.min(time)));
     }
     LoopMargins {
-        gain_up: factors
-            .clone()
-            .filter(|factor| *factor > 1.0)
-            .min_by(f64::total_cmp),
-        gain_down: factors
-            .filter(|factor| *factor < 1.0)
-            .max_by(f64::total_cmp),
+        gain_up: factors.clone().filter(|factor| *factor > 1.0).min_by(f64::total_cmp),
+        gain_down: factors.filter(|factor| *factor < 1.0).max_by(f64::total_cmp),
         phase_degrees: phase,
         delay_milliseconds: delay,
         modulus,
@@ -190,11 +172,7 @@ mod tests {
         let velocity = position.clone();
         position.position[0] = 1.0;
         position.reference_position[delay] = slope;
-        ArxModel {
-            position,
-            velocity,
-            residual: [0.0; 2],
-        }
+        ArxModel { position, velocity, residual: [0.0; 2] }
     }
 
     fn close(value: Option<f64>, expected: f64) -> bool {
@@ -207,25 +185,12 @@ mod tests {
         // T the delay and half a tick of hold on top of the tick that the model itself has.
         let (slope, delay) = (0.02, 29);
         let (rate, lag) = (slope / TICK, (delay as f64 + 0.5) * TICK);
-        let assessment = assess(
-            &delayed_integrator(slope, delay),
-            &LaneGain::pd(1.0, 0.0),
-            TICK,
-        );
+        let assessment = assess(&delayed_integrator(slope, delay), &LaneGain::pd(1.0, 0.0), TICK);
         let margins = assessment.margins.unwrap();
-        assert!(
-            close(margins.gain_up, PI / (2.0 * rate * lag)),
-            "{margins:?}"
-        );
+        assert!(close(margins.gain_up, PI / (2.0 * rate * lag)), "{margins:?}");
         assert_eq!(margins.gain_down, None);
-        assert!(
-            close(margins.phase_degrees, (PI / 2.0 - rate * lag).to_degrees()),
-            "{margins:?}"
-        );
-        assert!(
-            close(margins.delay_milliseconds, 1e3 * (PI / (2.0 * rate) - lag)),
-            "{margins:?}"
-        );
+        assert!(close(margins.phase_degrees, (PI / 2.0 - rate * lag).to_degrees()), "{margins:?}");
+        assert!(close(margins.delay_milliseconds, 1e3 * (PI / (2.0 * rate) - lag)), "{margins:?}");
         assert!(margins.crossovers.len() == 1 && close(Some(margins.crossovers[0]), rate));
         assert!(margins.modulus > 0.3 && margins.modulus < 1.0);
     }
@@ -233,21 +198,9 @@ mod tests {
     #[test]
     fn stability_ends_where_the_margins_say() {
         let (slope, delay) = (0.02, 29);
-        let radius = |gain: f64, delay: usize| {
-            assess(
-                &delayed_integrator(slope, delay),
-                &LaneGain::pd(gain, 0.0),
-                TICK,
-            )
-            .spectral_radius
-        };
-        let margins = assess(
-            &delayed_integrator(slope, delay),
-            &LaneGain::pd(1.0, 0.0),
-            TICK,
-        )
-        .margins
-        .unwrap();
+        let radius =
+            |gain: f64, delay: usize| assess(&delayed_integrator(slope, delay), &LaneGain::pd(gain, 0.0), TICK).spectral_radius;
+        let margins = assess(&delayed_integrator(slope, delay), &LaneGain::pd(1.0, 0.0), TICK).margins.unwrap();
         let gain = margins.gain_up.unwrap();
         assert!(radius(gain * 0.995, delay) < 1.0 && radius(gain * 1.005, delay) > 1.0);
         let ticks = (margins.delay_milliseconds.unwrap() / 10.0).floor() as usize;

@@ -102,11 +102,7 @@ impl DesignSettings {
             ("noise_factor", self.noise_factor),
             ("least_precision", self.least_precision),
             ("least_noise", self.least_noise[0].min(self.least_noise[1])),
-            (
-                "sensor_noise",
-                self.sensor_noise
-                    .map_or(0.0, |[position, velocity]| position.min(velocity)),
-            ),
+            ("sensor_noise", self.sensor_noise.map_or(0.0, |[position, velocity]| position.min(velocity))),
         ];
         for (field, value) in positive {
             if !(value > 0.0 && value.is_finite()) {
@@ -115,17 +111,11 @@ impl DesignSettings {
         }
         for (field, value) in not_negative {
             if !(value >= 0.0 && value.is_finite()) {
-                return Err(DesignRefusal::setting(
-                    field,
-                    "zero or positive, and finite",
-                ));
+                return Err(DesignRefusal::setting(field, "zero or positive, and finite"));
             }
         }
         if self.margin_lags < self.lags {
-            return Err(DesignRefusal::setting(
-                "margin_lags",
-                "no fewer than `lags`",
-            ));
+            return Err(DesignRefusal::setting("margin_lags", "no fewer than `lags`"));
         }
         Ok(())
     }
@@ -154,24 +144,17 @@ pub struct LaneDesign {
 const LEAST_STEADY_SHARE: f64 = 1e-3;
 
 /// Designs a lane for the axis group whose logs are in `data`.
-pub fn design(
-    data: &IdentificationData,
-    settings: &DesignSettings,
-) -> Result<LaneDesign, DesignRefusal> {
+pub fn design(data: &IdentificationData, settings: &DesignSettings) -> Result<LaneDesign, DesignRefusal> {
     settings.check()?;
     data.excitation().require(settings.least_excitation)?;
     let fit = |lags, noise| data.fit(lags, noise, settings.regularisation);
     let judge = fit(settings.margin_lags, [0.0; 2])?;
     let precision = data.excitation().innovation * (data.rows() as f64).sqrt() / judge.residual[1];
     if precision < settings.least_precision {
-        return Err(DesignRefusal::WeakExcitation {
-            precision,
-            minimum: settings.least_precision,
-        });
+        return Err(DesignRefusal::WeakExcitation { precision, minimum: settings.least_precision });
     }
     let noise = settings.sensor_noise.unwrap_or(judge.residual);
-    let added_noise =
-        [0, 1].map(|index| settings.noise_factor * noise[index].max(settings.least_noise[index]));
+    let added_noise = [0, 1].map(|index| settings.noise_factor * noise[index].max(settings.least_noise[index]));
     let model = fit(settings.lags, added_noise)?;
 
     let lags = settings.lags;
@@ -181,10 +164,8 @@ pub fn design(
     weights[lags] = settings.velocity_weight;
     weights[3 * lags - 1] = settings.integral_weight;
     let weights = DMatrix::from_diagonal(&weights);
-    let solution = riccati::solve(&errors.dynamics, &errors.input, &weights, settings.effort)
-        .ok_or(DesignRefusal::NoGain)?;
-    let spectral_radius =
-        riccati::spectral_radius(&(&errors.dynamics - &errors.input * &solution.gain));
+    let solution = riccati::solve(&errors.dynamics, &errors.input, &weights, settings.effort).ok_or(DesignRefusal::NoGain)?;
+    let spectral_radius = riccati::spectral_radius(&(&errors.dynamics - &errors.input * &solution.gain));
     // Without a weight the integral has no gain either, and its eigenvalue of 1 is nobody's.
     if spectral_radius >= 1.0 && settings.integral_weight > 0.0 {
         return Err(DesignRefusal::Unstable { spectral_radius });

@@ -6,9 +6,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum DesignRefusal {
     /// A signal's length differs from that of the measured position.
-    #[error(
-        "log {log}: `{signal}` has {length} samples, `measured_position` {expected}: log all signals at every tick"
-    )]
+    #[error("log {log}: `{signal}` has {length} samples, `measured_position` {expected}: log all signals at every tick")]
     UnequalLengths {
         /// Index of the log.
         log: usize,
@@ -30,9 +28,7 @@ pub enum DesignRefusal {
         tick: usize,
     },
     /// Too little flight time for so many coefficients.
-    #[error(
-        "{rows} rows are too few, {needed} are needed: fly longer (1.5 minutes an axis are enough)"
-    )]
+    #[error("{rows} rows are too few, {needed} are needed: fly longer (1.5 minutes an axis are enough)")]
     TooFewRows {
         /// Rows with a full past.
         rows: usize,
@@ -71,17 +67,13 @@ pub enum DesignRefusal {
         share: f64,
     },
     /// The normal equations are singular.
-    #[error(
-        "the fit with {lags} lags is singular: raise `regularisation`, or log a livelier flight"
-    )]
+    #[error("the fit with {lags} lags is singular: raise `regularisation`, or log a livelier flight")]
     SingularRegression {
         /// Memory of the model.
         lags: usize,
     },
     /// The Riccati equation has no solution.
-    #[error(
-        "no linear-quadratic gain exists for the identified model: its reference does not control it"
-    )]
+    #[error("no linear-quadratic gain exists for the identified model: its reference does not control it")]
     NoGain,
     /// The lane does not stabilise the model it was designed on.
     #[error("the designed loop is unstable: spectral radius {spectral_radius:.6}")]

@@ -55,11 +55,7 @@ pub fn solve(
         }
     }
     let (gain, residual) = gain_and_residual(dynamics, input, state_weight, input_weight, &cost);
-    (converged && residual < 1e-6).then_some(RiccatiSolution {
-        gain,
-        cost,
-        residual,
-    })
+    (converged && residual < 1e-6).then_some(RiccatiSolution { gain, cost, residual })
 }
 
 fn gain_and_residual(
@@ -72,8 +68,7 @@ fn gain_and_residual(
     let cost_of_input = input.transpose() * cost;
     let curvature = input_weight + (&cost_of_input * input)[0];
     let gain: RowDVector<f64> = &cost_of_input * dynamics / curvature;
-    let right = dynamics.transpose() * cost * dynamics - gain.transpose() * &gain * curvature
-        + state_weight;
+    let right = dynamics.transpose() * cost * dynamics - gain.transpose() * &gain * curvature + state_weight;
     (gain, (right - cost).norm() / cost.norm())
 }
 
@@ -118,8 +113,7 @@ mod tests {
         // x = a²x - a²b²x²/(r + b²x) + q with a = 1.2, b = 0.5, q = 1, r = 2, as a quadratic in x.
         let (a, b, q, r) = (1.2_f64, 0.5_f64, 1.0, 2.0);
         let (square, linear, constant) = (b * b, r - a * a * r - q * b * b, -q * r);
-        let expected =
-            (-linear + (linear * linear - 4.0 * square * constant).sqrt()) / (2.0 * square);
+        let expected = (-linear + (linear * linear - 4.0 * square * constant).sqrt()) / (2.0 * square);
         let one = |value: f64| DMatrix::from_element(1, 1, value);
         let solution = solve(&one(a), &DVector::from_element(1, b), &one(q), r).unwrap();
         assert!((solution.cost[0] - expected).abs() < 1e-10 * expected);
@@ -137,11 +131,7 @@ mod tests {
     fn spectral_radius_of_rotation_shift_and_growth() {
         let rotation = DMatrix::from_row_slice(2, 2, &[0.6, 0.75, -0.75, 0.6]);
         assert!((spectral_radius(&rotation) - 0.6_f64.hypot(0.75)).abs() < 1e-6);
-        let shift = DMatrix::from_fn(
-            30,
-            30,
-            |row, column| if row == column + 1 { 1.0 } else { 0.0 },
-        );
+        let shift = DMatrix::from_fn(30, 30, |row, column| if row == column + 1 { 1.0 } else { 0.0 });
         assert_eq!(spectral_radius(&shift), 0.0);
         let growing = DMatrix::from_row_slice(2, 2, &[1.001, 500.0, 0.0, 0.2]);
         assert!((spectral_radius(&growing) - 1.001).abs() < 1e-5);

@@ -59,20 +59,11 @@ impl Flight {
 
     /// The flight from which a lane is designed: 1.5 minutes of multisine with a dither of 1 cm.
     pub(super) fn collecting() -> Self {
-        Self {
-            seconds: 90.0,
-            dither: 0.01,
-            moving: true,
-            ..Self::lab()
-        }
+        Self { seconds: 90.0, dither: 0.01, moving: true, ..Self::lab() }
     }
 
     pub(super) fn rough(self) -> Self {
-        Self {
-            noise: [7e-4, 2e-2],
-            gusts: 0.12,
-            ..self
-        }
+        Self { noise: [7e-4, 2e-2], gusts: 0.12, ..self }
     }
 }
 
@@ -149,16 +140,10 @@ impl Lane {
 
 /// Sum of tones and its derivative.
 fn multisine(tones: &[[f64; 3]], time: f64) -> [f64; 2] {
-    tones.iter().fold(
-        [0.0; 2],
-        |[position, velocity], [amplitude, rate, phase]| {
-            let (sine, cosine) = (rate * time + phase).sin_cos();
-            [
-                position + amplitude * sine,
-                velocity + amplitude * rate * cosine,
-            ]
-        },
-    )
+    tones.iter().fold([0.0; 2], |[position, velocity], [amplitude, rate, phase]| {
+        let (sine, cosine) = (rate * time + phase).sin_cos();
+        [position + amplitude * sine, velocity + amplitude * rate * cosine]
+    })
 }
 
 pub(super) fn fly(flight: &Flight) -> Log {
@@ -166,19 +151,11 @@ pub(super) fn fly(flight: &Flight) -> Log {
     let tones: Vec<[f64; 3]> = (0..12)
         .map(|index| {
             let period = 1.5 * (20.0_f64 / 1.5).powf(f64::from(index) / 11.0);
-            [
-                0.05 * period.sqrt(),
-                TAU / period,
-                TAU * random.random::<f64>(),
-            ]
+            [0.05 * period.sqrt(), TAU / period, TAU * random.random::<f64>()]
         })
         .collect();
     let desired_at = |time: f64| {
-        if flight.moving {
-            multisine(&tones, time)
-        } else {
-            [0.0; 2]
-        }
+        if flight.moving { multisine(&tones, time) } else { [0.0; 2] }
     };
 
     let mut log = Log::default();
@@ -200,18 +177,13 @@ pub(super) fn fly(flight: &Flight) -> Log {
         let measured = [true_position + noise[0], true_velocity + noise[1]];
         let desired = desired_at(time);
         let matched = desired_at(time - DELAY);
-        let correction = lane.as_mut().map_or(0.0, |lane| {
-            lane.step(
-                [measured[0] - matched[0], measured[1] - matched[1]],
-                flight.limits,
-            )
-        });
+        let correction =
+            lane.as_mut().map_or(0.0, |lane| lane.step([measured[0] - matched[0], measured[1] - matched[1]], flight.limits));
         if tick % 5 == 0 && random.random::<bool>() {
             dither = -dither;
         }
         let reference = [desired[0] + dither + correction, desired[1]];
-        let command =
-            flight.gain * (6.5 * (reference[0] - measured[0]) + 4.0 * (reference[1] - measured[1]));
+        let command = flight.gain * (6.5 * (reference[0] - measured[0]) + 4.0 * (reference[1] - measured[1]));
         log.measured_position.push(measured[0]);
         log.measured_velocity.push(measured[1]);
         log.reference_position.push(reference[0]);
@@ -222,8 +194,7 @@ pub(super) fn fly(flight: &Flight) -> Log {
             let normal: f64 = StandardNormal.sample(&mut random);
             gust += -gust * STEP / 0.4 + flight.gusts * (2.0 * STEP / 0.4_f64).sqrt() * normal;
             // 310 / (0.072 s³ + s² + 57 s + 310), semi-implicit: the newest derivative is used at once.
-            attitude[2] +=
-                STEP * (310.0 * (command - attitude[0]) - 57.0 * attitude[1] - attitude[2]) / 0.072;
+            attitude[2] += STEP * (310.0 * (command - attitude[0]) - 57.0 * attitude[1] - attitude[2]) / 0.072;
             attitude[1] += STEP * attitude[2];
             attitude[0] += STEP * attitude[1];
             velocity += STEP * (attitude[0] + gust + flight.push);

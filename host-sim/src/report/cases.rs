@@ -62,22 +62,13 @@ impl<'a> Case<'a> {
 
 /// The methods that occur in the table, in column order.
 pub(super) fn methods(rows: &[Row]) -> Vec<Method> {
-    Method::ALL
-        .into_iter()
-        .filter(|method| rows.iter().any(|row| row.method == *method))
-        .collect()
+    Method::ALL.into_iter().filter(|method| rows.iter().any(|row| row.method == *method)).collect()
 }
 
 /// `30`, `28 to 30`, or `None` when no flights are listed: how many flights stand behind a cell.
 pub(super) fn flights_in_words(cases: &[Case<'_>], flights: &[PerFlight]) -> Option<String> {
-    let counts: Vec<usize> = cases
-        .iter()
-        .flat_map(|case| {
-            case.rows
-                .iter()
-                .map(|row| case.flights(flights, row.method).len())
-        })
-        .collect();
+    let counts: Vec<usize> =
+        cases.iter().flat_map(|case| case.rows.iter().map(|row| case.flights(flights, row.method).len())).collect();
     let (least, most) = (counts.iter().min()?, counts.iter().max()?);
     match (least, most) {
         (_, 0) => None,
@@ -106,9 +97,7 @@ impl<'a> Scene<'a> {
             });
             match found {
                 Some(scene) => scene.traces.push(trace),
-                None => scenes.push(Self {
-                    traces: vec![trace],
-                }),
+                None => scenes.push(Self { traces: vec![trace] }),
             }
         }
         scenes
@@ -120,19 +109,12 @@ impl<'a> Scene<'a> {
     }
 
     pub(super) fn baseline(&self) -> Option<&'a FlightTrace> {
-        self.traces
-            .iter()
-            .copied()
-            .find(|trace| trace.method == Method::Baseline)
+        self.traces.iter().copied().find(|trace| trace.method == Method::Baseline)
     }
 
     /// The trace to set against the baseline: the last method in column order, which is the most complete one.
     pub(super) fn add_on(&self) -> Option<&'a FlightTrace> {
-        self.traces
-            .iter()
-            .copied()
-            .filter(|trace| trace.method != Method::Baseline)
-            .max_by_key(|trace| trace.method)
+        self.traces.iter().copied().filter(|trace| trace.method != Method::Baseline).max_by_key(|trace| trace.method)
     }
 }
 
@@ -163,11 +145,7 @@ pub fn summarise(flights: &[PerFlight]) -> Vec<Row> {
 fn row_of(group: &[&PerFlight]) -> Row {
     let count = group.len() as f64;
     let least = |worst: f64, value: f64| {
-        if worst.is_nan() || value.is_nan() {
-            f64::NAN
-        } else {
-            worst.min(value)
-        }
+        if worst.is_nan() || value.is_nan() { f64::NAN } else { worst.min(value) }
     };
     let first = group[0];
     Row {
@@ -178,10 +156,7 @@ fn row_of(group: &[&PerFlight]) -> Row {
         method: first.method,
         rms_cm_mean: group.iter().map(|flight| flight.rms_cm).sum::<f64>() / count,
         reduction_mean: group.iter().map(|flight| flight.reduction).sum::<f64>() / count,
-        reduction_worst: group
-            .iter()
-            .map(|flight| flight.reduction)
-            .fold(f64::INFINITY, least),
+        reduction_worst: group.iter().map(|flight| flight.reduction).fold(f64::INFINITY, least),
         seed: first.seed,
     }
 }
@@ -199,26 +174,14 @@ mod tests {
             .collect();
         let rows = summarise(&flights);
         assert_eq!(rows.len(), 1);
-        assert_eq!(
-            (
-                rows[0].rms_cm_mean,
-                rows[0].reduction_mean,
-                rows[0].reduction_worst
-            ),
-            (3.0, 65.0, 50.0)
-        );
+        assert_eq!((rows[0].rms_cm_mean, rows[0].reduction_mean, rows[0].reduction_worst), (3.0, 65.0, 50.0));
     }
 
     #[test]
     fn one_crash_makes_the_whole_cell_not_a_number() {
-        let flights = [
-            fixture::flight(Method::NetF32, "a", f64::NAN, f64::NAN),
-            fixture::flight(Method::NetF32, "b", 1.0, 90.0),
-        ];
+        let flights = [fixture::flight(Method::NetF32, "a", f64::NAN, f64::NAN), fixture::flight(Method::NetF32, "b", 1.0, 90.0)];
         let row = &summarise(&flights)[0];
-        assert!(
-            row.rms_cm_mean.is_nan() && row.reduction_mean.is_nan() && row.reduction_worst.is_nan()
-        );
+        assert!(row.rms_cm_mean.is_nan() && row.reduction_mean.is_nan() && row.reduction_worst.is_nan());
     }
 
     #[test]

@@ -96,9 +96,7 @@ impl Method {
     /// What the method is, for a reader who has not read the paper.
     pub(super) const fn in_words(self) -> &'static str {
         match self {
-            Self::Baseline => {
-                "The control loop alone, given the desired trajectory as its reference."
-            }
+            Self::Baseline => "The control loop alone, given the desired trajectory as its reference.",
             Self::Feedforward => {
                 "The desired acceleration divided by the position gain is added to the position reference; nothing is learned."
             }
@@ -111,19 +109,11 @@ impl Method {
             Self::Ridge => {
                 "A linear map from the same preview window that the network sees, fitted by ridge regression; no feedback lane."
             }
-            Self::NetF32 => {
-                "The network lane alone, with 32-bit floating-point weights: the add-on of the paper."
-            }
-            Self::NetInt8 => {
-                "The network lane alone, quantised to 8-bit weights as the microcontroller runs it."
-            }
+            Self::NetF32 => "The network lane alone, with 32-bit floating-point weights: the add-on of the paper.",
+            Self::NetInt8 => "The network lane alone, quantised to 8-bit weights as the microcontroller runs it.",
             Self::FullRidge => "Ridge regression in the network's place, plus the feedback lane.",
-            Self::FullF32 => {
-                "Both lanes, with the network in 32-bit floating point: shows what quantisation costs."
-            }
-            Self::FullInt8 => {
-                "Both lanes, with the network in 8-bit weights: exactly what is flashed."
-            }
+            Self::FullF32 => "Both lanes, with the network in 32-bit floating point: shows what quantisation costs.",
+            Self::FullInt8 => "Both lanes, with the network in 8-bit weights: exactly what is flashed.",
         }
     }
 
@@ -144,25 +134,12 @@ mod tests {
 
     #[test]
     fn serialised_names_are_the_documented_ones() {
-        let names: Vec<String> = Method::ALL
-            .iter()
-            .map(|method| {
-                serde_json::to_value(method)
-                    .unwrap()
-                    .as_str()
-                    .unwrap()
-                    .to_owned()
-            })
-            .collect();
+        let names: Vec<String> =
+            Method::ALL.iter().map(|method| serde_json::to_value(method).unwrap().as_str().unwrap().to_owned()).collect();
         assert_eq!(
             names.join(" "),
             "baseline feedforward feedback feedforward_feedback ridge net_f32 net_int8 full_ridge full_f32 full_int8"
         );
-        assert!(
-            Method::ALL
-                .iter()
-                .zip(&names)
-                .all(|(method, name)| method.name() == name)
-        );
+        assert!(Method::ALL.iter().zip(&names).all(|(method, name)| method.name() == name));
     }
 }

@@ -27,11 +27,7 @@ pub(super) fn centimetres(value: f64) -> String {
 
 /// A centimetre value with its unit; `n/a` has none.
 pub(super) fn centimetres_with_unit(value: f64) -> String {
-    if value.is_finite() {
-        format!("{} cm", centimetres(value))
-    } else {
-        NOT_AVAILABLE.to_owned()
-    }
+    if value.is_finite() { format!("{} cm", centimetres(value)) } else { NOT_AVAILABLE.to_owned() }
 }
 
 /// Per cent with one decimal, without the sign `%`.
@@ -49,11 +45,7 @@ pub(super) fn mean_and_worst(mean: f64, worst: f64, separator: &str) -> String {
 
 /// Speed factor, `1.35x`.
 pub(super) fn speed(value: f64) -> String {
-    if value.is_finite() {
-        format!("{value}x")
-    } else {
-        NOT_AVAILABLE.to_owned()
-    }
+    if value.is_finite() { format!("{value}x") } else { NOT_AVAILABLE.to_owned() }
 }
 
 /// Whole numbers with a thin gap every three digits.
@@ -80,20 +72,12 @@ mod tests {
 
     #[test]
     fn digits_follow_the_size() {
-        let shown: Vec<String> = [0.184, 1.2, 9.999, 11.23, 217.4, -0.001, f64::INFINITY]
-            .map(centimetres)
-            .into();
-        assert_eq!(
-            shown,
-            ["0.18", "1.20", "10.0", "11.2", "217", "0.00", "n/a"]
-        );
+        let shown: Vec<String> = [0.184, 1.2, 9.999, 11.23, 217.4, -0.001, f64::INFINITY].map(centimetres).into();
+        assert_eq!(shown, ["0.18", "1.20", "10.0", "11.2", "217", "0.00", "n/a"]);
         assert_eq!(percent(-217.44), "-217.4");
         assert_eq!(mean_and_worst(98.52, 95.0, "/"), "98.5/95.0");
         assert_eq!(mean_and_worst(f64::NAN, f64::NAN, "/"), "n/a");
         assert_eq!(thousands(1_234_567), "1\u{202f}234\u{202f}567");
-        assert_eq!(
-            (speed(1.0), speed(1.35)),
-            ("1x".to_owned(), "1.35x".to_owned())
-        );
+        assert_eq!((speed(1.0), speed(1.35)), ("1x".to_owned(), "1.35x".to_owned()));
     }
 }

@@ -192,58 +192,29 @@ mod tests {
 
     #[test]
     fn a_row_has_exactly_the_documented_keys() {
-        let document: serde_json::Value =
-            serde_json::from_str(&fixture::small().to_json().unwrap()).unwrap();
-        let mut keys: Vec<&str> = document["table"][0]
-            .as_object()
-            .unwrap()
-            .keys()
-            .map(String::as_str)
-            .collect();
+        let document: serde_json::Value = serde_json::from_str(&fixture::small().to_json().unwrap()).unwrap();
+        let mut keys: Vec<&str> = document["table"][0].as_object().unwrap().keys().map(String::as_str).collect();
         keys.sort_unstable();
         assert_eq!(
             keys,
-            [
-                "condition",
-                "gains",
-                "method",
-                "reduction_mean",
-                "reduction_worst",
-                "rms_cm_mean",
-                "seed",
-                "speed",
-                "vehicle"
-            ]
+            ["condition", "gains", "method", "reduction_mean", "reduction_worst", "rms_cm_mean", "seed", "speed", "vehicle"]
         );
     }
 
     #[test]
     fn json_survives_a_round_trip_and_numbers_that_are_not_finite() {
         let mut results = fixture::small();
-        assert_eq!(
-            Results::from_json(&results.to_json().unwrap()).unwrap(),
-            results
-        );
+        assert_eq!(Results::from_json(&results.to_json().unwrap()).unwrap(), results);
         results.table[0].reduction_worst = f64::NEG_INFINITY;
         let text = results.to_json().unwrap();
         assert!(text.contains("\"reduction_worst\": null"));
-        assert!(
-            Results::from_json(&text).unwrap().table[0]
-                .reduction_worst
-                .is_nan()
-        );
+        assert!(Results::from_json(&text).unwrap().table[0].reduction_worst.is_nan());
     }
 
     #[test]
     fn an_unknown_method_is_refused_by_name() {
-        let text = fixture::small()
-            .to_json()
-            .unwrap()
-            .replace("\"full_int8\"", "\"full_int7\"");
+        let text = fixture::small().to_json().unwrap().replace("\"full_int8\"", "\"full_int7\"");
         let message = format!("{:#}", Results::from_json(&text).unwrap_err());
-        assert!(
-            message.contains("full_int7") && message.contains("line"),
-            "{message}"
-        );
+        assert!(message.contains("full_int7") && message.contains("line"), "{message}");
     }
 }

@@ -3,9 +3,7 @@
 use super::pen::Pace;
 use super::rows::Rows;
 use super::{Motion, MultisineSettings, SplineSettings, TrajectoryError};
-use super::{
-    circle, figure_eight, growing_tones, helix, letters, lissajous, multisine, random_spline,
-};
+use super::{circle, figure_eight, growing_tones, helix, letters, lissajous, multisine, random_spline};
 use super::{segments, single_tone, star, stroke, table, trefoil};
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -43,20 +41,13 @@ pub fn by_name(name: &str) -> Result<Motion, TrajectoryError> {
         "trefoil" => trefoil(3.0, 14.0, 1.0),
         "star" => star(5, 1.5, 0.5, Pace::default()),
         "letters" => letters(words.text("TEXT")?, 1.5, Pace::default())?,
-        "multisine" => multisine(
-            words.number("SEED")?,
-            words.within("SECONDS", 180.0, 6.0, 3600.0)?,
-            &MultisineSettings::default(),
-        ),
-        "spline" => random_spline(
-            words.number("SEED")?,
-            words.within("SECONDS", 180.0, 6.0, 3590.0)?,
-            &SplineSettings::default(),
-        ),
-        "tones" => growing_tones(
-            [6.0, 7.5, 9.0],
-            words.within("SECONDS", 400.0, 6.0, 3600.0)?,
-        ),
+        "multisine" => {
+            multisine(words.number("SEED")?, words.within("SECONDS", 180.0, 6.0, 3600.0)?, &MultisineSettings::default())
+        }
+        "spline" => {
+            random_spline(words.number("SEED")?, words.within("SECONDS", 180.0, 6.0, 3590.0)?, &SplineSettings::default())
+        }
+        "tones" => growing_tones([6.0, 7.5, 9.0], words.within("SECONDS", 400.0, 6.0, 3600.0)?),
         "tone" => {
             let axis = match words.text("AXIS")? {
                 "x" => 0,
@@ -93,10 +84,7 @@ impl<'a> Words<'a> {
     }
 
     fn refused(&self, problem: String) -> TrajectoryError {
-        TrajectoryError::Name {
-            name: self.name.into(),
-            problem,
-        }
+        TrajectoryError::Name { name: self.name.into(), problem }
     }
 
     fn text(&mut self, argument: &str) -> Result<&'a str, TrajectoryError> {
@@ -108,25 +96,16 @@ impl<'a> Words<'a> {
 
     fn number<T: FromStr>(&mut self, argument: &str) -> Result<T, TrajectoryError> {
         let word = self.text(argument)?;
-        word.parse()
-            .map_err(|_| self.refused(format!("{argument} is `{word}`, expected a number")))
+        word.parse().map_err(|_| self.refused(format!("{argument} is `{word}`, expected a number")))
     }
 
-    fn within(
-        &mut self,
-        argument: &str,
-        default: f64,
-        low: f64,
-        high: f64,
-    ) -> Result<f64, TrajectoryError> {
+    fn within(&mut self, argument: &str, default: f64, low: f64, high: f64) -> Result<f64, TrajectoryError> {
         let Some(word) = self.rest.next() else {
             return Ok(default);
         };
         match word.parse::<f64>() {
             Ok(value) if (low..=high).contains(&value) => Ok(value),
-            _ => Err(self.refused(format!(
-                "{argument} is `{word}`, expected a number from {low} to {high}"
-            ))),
+            _ => Err(self.refused(format!("{argument} is `{word}`, expected a number from {low} to {high}"))),
         }
     }
 }

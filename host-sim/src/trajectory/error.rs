@@ -24,9 +24,7 @@ pub enum TrajectoryError {
         problem: String,
     },
     /// The header row is of neither format.
-    #[error(
-        "{file}, line 1: {problem}; expected the header `t,x,y,z[,yaw]` or `duration,x^0,…,x^7,y^0,…,z^0,…,yaw^0,…,yaw^7`"
-    )]
+    #[error("{file}, line 1: {problem}; expected the header `t,x,y,z[,yaw]` or `duration,x^0,…,x^7,y^0,…,z^0,…,yaw^0,…,yaw^7`")]
     Header {
         /// File as given.
         file: String,

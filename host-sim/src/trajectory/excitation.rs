@@ -74,14 +74,8 @@ impl Curve for Tones {
 
     fn at(&self, seconds: f64) -> Sample {
         let [gain, growth] = self.gain;
-        let envelope = product(
-            window(seconds, self.duration, self.fade),
-            [gain + growth * seconds, growth, 0.0],
-        );
-        let mut sample = Sample {
-            yaw: envelope[0] * tones::sum(&self.yaw, seconds)[0],
-            ..Sample::default()
-        };
+        let envelope = product(window(seconds, self.duration, self.fade), [gain + growth * seconds, growth, 0.0]);
+        let mut sample = Sample { yaw: envelope[0] * tones::sum(&self.yaw, seconds)[0], ..Sample::default() };
         for axis in 0..3 {
             let [value, first, second] = product(envelope, tones::sum(&self.axes[axis], seconds));
             sample.position[axis] = self.centre[axis] + value;
@@ -96,9 +90,7 @@ impl Tones {
     /// Raises the centre until nothing is below the floor.
     fn above_floor(mut self) -> Self {
         let steps = (self.duration / GRID).ceil() as usize;
-        let lowest = (0..=steps)
-            .map(|i| self.at((i as f64 * GRID).min(self.duration)).position[2])
-            .fold(f64::MAX, f64::min);
+        let lowest = (0..=steps).map(|i| self.at((i as f64 * GRID).min(self.duration)).position[2]).fold(f64::MAX, f64::min);
         self.centre[2] += (FLOOR - lowest).max(0.0);
         self
     }
@@ -117,20 +109,9 @@ const GRID: f64 = 0.05;
 #[must_use]
 pub fn multisine(seed: u64, duration: f64, settings: &MultisineSettings) -> Motion {
     let s = settings;
-    let positive = [
-        s.periods[0],
-        s.periods[1] - s.periods[0],
-        s.max_speed,
-        s.max_acceleration,
-    ];
-    assert!(
-        s.tones > 0 && positive.iter().all(|x| x.is_finite() && *x > 0.0),
-        "multisine settings"
-    );
-    assert!(
-        s.fade > 0.0 && duration >= 2.0 * s.fade && s.axis_weights[0] > 0.0,
-        "multisine settings"
-    );
+    let positive = [s.periods[0], s.periods[1] - s.periods[0], s.max_speed, s.max_acceleration];
+    assert!(s.tones > 0 && positive.iter().all(|x| x.is_finite() && *x > 0.0), "multisine settings");
+    assert!(s.fade > 0.0 && duration >= 2.0 * s.fade && s.axis_weights[0] > 0.0, "multisine settings");
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut tones = |count: usize, [shortest, longest]: [f64; 2]| -> Vec<Tone> {
         (0..count)
@@ -155,8 +136,7 @@ pub fn multisine(seed: u64, duration: f64, settings: &MultisineSettings) -> Moti
     let shaped = |power: f64| {
         let mut shaped = flat.clone();
         for (axis, weight) in shaped.axes.iter_mut().zip(s.axis_weights) {
-            axis.iter_mut()
-                .for_each(|t| t.amplitude = weight * pow(t.rate, -power));
+            axis.iter_mut().for_each(|t| t.amplitude = weight * pow(t.rate, -power));
         }
         let peaks = Motion::new("", shaped.clone()).peaks(GRID);
         (shaped, peaks)
@@ -179,10 +159,7 @@ pub fn multisine(seed: u64, duration: f64, settings: &MultisineSettings) -> Moti
         tone.amplitude *= scale;
     }
     let count = signal.yaw.len() as f64;
-    signal
-        .yaw
-        .iter_mut()
-        .for_each(|tone| tone.amplitude = s.yaw / count);
+    signal.yaw.iter_mut().for_each(|tone| tone.amplitude = s.yaw / count);
     Motion::new(format!("multisine:{seed}"), signal.above_floor())
 }
 
@@ -193,10 +170,7 @@ pub fn multisine(seed: u64, duration: f64, settings: &MultisineSettings) -> Moti
 /// When the periods are not positive or the duration is shorter than 6 s.
 #[must_use]
 pub fn growing_tones(periods: [f64; 3], duration: f64) -> Motion {
-    assert!(
-        duration >= 6.0 && periods.iter().all(|p| *p > 0.0),
-        "periods are positive, 6 s at least"
-    );
+    assert!(duration >= 6.0 && periods.iter().all(|p| *p > 0.0), "periods are positive, 6 s at least");
     let signal = Tones {
         axes: periods.map(|period| vec![tone(1.0, period)]),
         yaw: Vec::new(),
@@ -214,29 +188,15 @@ pub fn growing_tones(periods: [f64; 3], duration: f64) -> Motion {
 /// When the axis is above 2, the period not positive or the duration shorter than two periods.
 #[must_use]
 pub fn single_tone(axis: usize, amplitude: f64, period: f64, duration: f64) -> Motion {
-    assert!(
-        axis < 3 && period > 0.0 && duration >= 2.0 * period,
-        "axis 0 to 2, two periods at least"
-    );
+    assert!(axis < 3 && period > 0.0 && duration >= 2.0 * period, "axis 0 to 2, two periods at least");
     let mut axes: [Vec<Tone>; 3] = std::array::from_fn(|_| Vec::new());
     axes[axis].push(tone(amplitude, period));
-    let signal = Tones {
-        axes,
-        yaw: Vec::new(),
-        centre: [0.0, 0.0, 1.5],
-        duration,
-        fade: period,
-        gain: [1.0, 0.0],
-    };
+    let signal = Tones { axes, yaw: Vec::new(), centre: [0.0, 0.0, 1.5], duration, fade: period, gain: [1.0, 0.0] };
     Motion::new("tone", signal.above_floor())
 }
 
 fn tone(amplitude: f64, period: f64) -> Tone {
-    Tone {
-        amplitude,
-        rate: TAU / period,
-        phase: 0.0,
-    }
+    Tone { amplitude, rate: TAU / period, phase: 0.0 }
 }
 
 #[cfg(test)]
@@ -245,27 +205,14 @@ mod tests {
 
     #[test]
     fn multisine_reaches_both_peaks_and_stays_above_the_floor() {
-        let settings = MultisineSettings {
-            yaw: 0.5,
-            ..MultisineSettings::default()
-        };
+        let settings = MultisineSettings { yaw: 0.5, ..MultisineSettings::default() };
         for seed in 0..3 {
-            let signal = multisine(seed, 90.0, &settings)
-                .sampled(100.0)
-                .expect("rate");
+            let signal = multisine(seed, 90.0, &settings).sampled(100.0).expect("rate");
             let (speed, acceleration) = (signal.peak_speed(), signal.peak_acceleration());
             assert!(speed <= settings.max_speed && acceleration <= settings.max_acceleration);
             assert!(speed > 0.97 * settings.max_speed, "{speed}");
-            assert!(
-                acceleration > 0.97 * settings.max_acceleration,
-                "{acceleration}"
-            );
-            assert!(
-                signal
-                    .samples
-                    .iter()
-                    .all(|s| s.position[2] > 0.49 && s.yaw.abs() <= 0.5)
-            );
+            assert!(acceleration > 0.97 * settings.max_acceleration, "{acceleration}");
+            assert!(signal.samples.iter().all(|s| s.position[2] > 0.49 && s.yaw.abs() <= 0.5));
             assert!(signal.samples.iter().any(|s| s.yaw.abs() > 0.1));
         }
     }
@@ -273,11 +220,7 @@ mod tests {
     #[test]
     fn growing_tones_grow_as_stated() {
         let signal = growing_tones([6.0, 7.5, 9.0], 400.0);
-        let largest = |from: f64| {
-            (0..600)
-                .map(|i| signal.at(from + f64::from(i) * 0.01).position[0].abs())
-                .fold(0.0, f64::max)
-        };
+        let largest = |from: f64| (0..600).map(|i| signal.at(from + f64::from(i) * 0.01).position[0].abs()).fold(0.0, f64::max);
         assert!((largest(303.0) / largest(153.0) - 2.0).abs() < 0.05);
         assert!((largest(297.0) - 0.003 * 300.0).abs() < 0.01);
     }

@@ -48,15 +48,10 @@ const GLYPHS: [&str; 26] = [
 /// No letter, too many, another character, or a height outside 0.1 to 10 m.
 pub fn letters(text: &str, height: f64, pace: Pace) -> Result<Motion, TrajectoryError> {
     let name = format!("letters:{text}");
-    let refused = |problem: String| TrajectoryError::Name {
-        name: name.clone(),
-        problem,
-    };
+    let refused = |problem: String| TrajectoryError::Name { name: name.clone(), problem };
     let length = text.chars().count();
     if length > MOST_LETTERS || text.trim().is_empty() {
-        return Err(refused(format!(
-            "expected 1 to {MOST_LETTERS} letters A to Z"
-        )));
+        return Err(refused(format!("expected 1 to {MOST_LETTERS} letters A to Z")));
     }
     if !(0.1..=10.0).contains(&height) {
         return Err(refused(format!("height {height} m, expected 0.1 to 10 m")));
@@ -74,11 +69,7 @@ pub fn letters(text: &str, height: f64, pace: Pace) -> Result<Motion, Trajectory
             let digits = corner.as_bytes();
             let column = f64::from(digits[0] - b'0') + (place * ADVANCE) as f64 - middle;
             let row = f64::from(digits[1] - b'0') - 3.0;
-            [
-                column * unit,
-                0.0,
-                CENTRE_HEIGHT.max(height / 2.0 + 0.5) + row * unit,
-            ]
+            [column * unit, 0.0, CENTRE_HEIGHT.max(height / 2.0 + 0.5) + row * unit]
         }));
     }
     let path = pen::rounded(&corners, 0.3 * unit);
@@ -95,10 +86,7 @@ mod tests {
         for letter in 'A'..='Z' {
             let motion = letters(&letter.to_string(), 1.5, pace).expect("letter");
             let (speed, acceleration) = motion.peaks(0.005);
-            assert!(
-                speed <= pace.max_speed && acceleration <= pace.max_acceleration,
-                "{letter}"
-            );
+            assert!(speed <= pace.max_speed && acceleration <= pace.max_acceleration, "{letter}");
             assert!((1.0..20.0).contains(&motion.duration()), "{letter}");
         }
     }
@@ -118,14 +106,8 @@ mod tests {
 
     #[test]
     fn other_characters_are_named() {
-        for (text, part) in [
-            ("D5L", "`5`"),
-            ("", "1 to 16"),
-            ("ABCDEFGHIJKLMNOPQ", "1 to 16"),
-        ] {
-            let error = letters(text, 1.5, Pace::default())
-                .expect_err("refused")
-                .to_string();
+        for (text, part) in [("D5L", "`5`"), ("", "1 to 16"), ("ABCDEFGHIJKLMNOPQ", "1 to 16")] {
+            let error = letters(text, 1.5, Pace::default()).expect_err("refused").to_string();
             assert!(error.contains(part), "{error}");
         }
     }

@@ -63,11 +63,7 @@ impl Sample {
     /// The same place and heading, at rest.
     #[must_use]
     pub fn at_rest(self) -> Self {
-        Self {
-            velocity: [0.0; 3],
-            acceleration: [0.0; 3],
-            ..self
-        }
+        Self { velocity: [0.0; 3], acceleration: [0.0; 3], ..self }
     }
 
     /// True when every number is finite.
@@ -133,27 +129,20 @@ impl Trajectory {
     /// Largest speed of any sample, m/s.
     #[must_use]
     pub fn peak_speed(&self) -> f64 {
-        self.samples
-            .iter()
-            .fold(0.0, |peak, s| norm(s.velocity).max(peak))
+        self.samples.iter().fold(0.0, |peak, s| norm(s.velocity).max(peak))
     }
 
     /// Largest acceleration of any sample, m/s².
     #[must_use]
     pub fn peak_acceleration(&self) -> f64 {
-        self.samples
-            .iter()
-            .fold(0.0, |peak, s| norm(s.acceleration).max(peak))
+        self.samples.iter().fold(0.0, |peak, s| norm(s.acceleration).max(peak))
     }
 
     /// Root mean square of the acceleration over the drawn part, m/s².
     #[must_use]
     pub fn rms_acceleration(&self) -> f64 {
         let drawn = &self.samples[self.scored.clone()];
-        let sum: f64 = drawn
-            .iter()
-            .map(|s| norm(s.acceleration) * norm(s.acceleration))
-            .sum();
+        let sum: f64 = drawn.iter().map(|s| norm(s.acceleration) * norm(s.acceleration)).sum();
         (sum / drawn.len().max(1) as f64).sqrt()
     }
 }

@@ -36,11 +36,7 @@ impl fmt::Debug for Motion {
 impl Motion {
     /// A curve with a name, flown as it is.
     pub fn new(name: impl Into<String>, curve: impl Curve + 'static) -> Self {
-        Self {
-            name: name.into(),
-            curve: Arc::new(curve),
-            speed: 1.0,
-        }
+        Self { name: name.into(), curve: Arc::new(curve), speed: 1.0 }
     }
 
     /// The name that its trajectories get.
@@ -52,10 +48,7 @@ impl Motion {
     /// The same curve under another name.
     #[must_use]
     pub fn named(self, name: impl Into<String>) -> Self {
-        Self {
-            name: name.into(),
-            ..self
-        }
+        Self { name: name.into(), ..self }
     }
 
     /// The same path flown `factor` times as fast: duration / factor, speed * factor, acceleration * factor².
@@ -64,10 +57,7 @@ impl Motion {
     /// When the factor is not a positive finite number.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
-        assert!(
-            factor.is_finite() && factor > 0.0,
-            "a motion is scaled by a positive factor"
-        );
+        assert!(factor.is_finite() && factor > 0.0, "a motion is scaled by a positive factor");
         let speed = self.speed * factor;
         Self { speed, ..self }
     }
@@ -108,10 +98,7 @@ impl Motion {
         }
         let duration = self.duration();
         if duration.is_nan() || duration > LONGEST_SECONDS {
-            return Err(TrajectoryError::TooLong {
-                name: self.name.clone(),
-                seconds: duration,
-            });
+            return Err(TrajectoryError::TooLong { name: self.name.clone(), seconds: duration });
         }
         let lead = (LEAD_SECONDS * rate_hz).round() as usize;
         let tail = (TAIL_SECONDS * rate_hz).round() as usize;
@@ -120,12 +107,7 @@ impl Motion {
         let time = |index: usize| ((index as f64 - lead as f64) / rate_hz).min(duration);
         let mut samples: Vec<Sample> = (0..lead + drawn).map(|i| self.at(time(i))).collect();
         samples.extend(std::iter::repeat_n(self.at(duration).at_rest(), tail));
-        Ok(Trajectory {
-            name: self.name.clone(),
-            rate_hz,
-            samples,
-            scored: lead..lead + drawn,
-        })
+        Ok(Trajectory { name: self.name.clone(), rate_hz, samples, scored: lead..lead + drawn })
     }
 
     /// Largest speed and acceleration, found on a grid of `step` seconds: m/s, m/s².
@@ -134,10 +116,7 @@ impl Motion {
         let count = (self.duration() / step).ceil() as usize;
         (0..=count).fold((0.0_f64, 0.0_f64), |(speed, acceleration), index| {
             let sample = self.at((index as f64 * step).min(self.duration()));
-            (
-                super::norm(sample.velocity).max(speed),
-                super::norm(sample.acceleration).max(acceleration),
-            )
+            (super::norm(sample.velocity).max(speed), super::norm(sample.acceleration).max(acceleration))
         })
     }
 }

@@ -25,11 +25,7 @@ pub struct Pace {
 impl Default for Pace {
     /// A quick, accurate hand, inside the limits of the test strokes (1.28 m/s, 4.2 m/s²).
     fn default() -> Self {
-        Self {
-            max_speed: 1.28,
-            max_acceleration: 4.2,
-            bend_speed: 1.0,
-        }
+        Self { max_speed: 1.28, max_acceleration: 4.2, bend_speed: 1.0 }
     }
 }
 
@@ -51,8 +47,7 @@ pub(crate) fn drawn(path: &[[f64; 3]], pace: Pace) -> PiecewisePolynomial {
     };
     let (speed, acceleration) = Motion::new("", spline(1.0)).peaks(PEAK_STEP);
     // Between the grid's points a peak can be a little higher, hence 0.1 %.
-    let stretch =
-        (speed / pace.max_speed).max((acceleration / pace.max_acceleration).sqrt()) * 1.001;
+    let stretch = (speed / pace.max_speed).max((acceleration / pace.max_acceleration).sqrt()) * 1.001;
     spline(stretch.max(1.0))
 }
 
@@ -107,9 +102,7 @@ fn speed_profile(points: &[[f64; 3]], spacing: f64, pace: Pace) -> Vec<f64> {
     // What the bend leaves of the acceleration is there to speed up and, backwards, to slow down.
     let reachable = |from: f64, bend: f64| {
         let across = from * from * bend;
-        let along = (pace.max_acceleration.powi(2) - across * across)
-            .max(0.0)
-            .sqrt();
+        let along = (pace.max_acceleration.powi(2) - across * across).max(0.0).sqrt();
         (from * from + 2.0 * along * spacing).sqrt()
     };
     for i in 1..=last {
@@ -152,9 +145,7 @@ pub(crate) fn rounded(corners: &[[f64; 3]], sigma: f64) -> Vec<[f64; 3]> {
 /// Gaussian smoothing, `sigma` in samples, cut off at three sigma; the ends are continued as they are.
 fn smoothed(points: &[[f64; 3]], sigma: f64) -> Vec<[f64; 3]> {
     let reach = (3.0 * sigma).ceil() as isize;
-    let weights: Vec<f64> = (-reach..=reach)
-        .map(|i| exp(-0.5 * (i as f64 / sigma).powi(2)))
-        .collect();
+    let weights: Vec<f64> = (-reach..=reach).map(|i| exp(-0.5 * (i as f64 / sigma).powi(2))).collect();
     let total: f64 = weights.iter().sum();
     let last = points.len() as isize - 1;
     (0..=last)
@@ -182,13 +173,7 @@ mod tests {
 
     #[test]
     fn a_square_is_drawn_within_the_limits_and_close_to_its_corners() {
-        let corners = [
-            [0.0; 3],
-            [2.0, 0.0, 0.0],
-            [2.0, 2.0, 0.0],
-            [0.0, 2.0, 0.0],
-            [0.0; 3],
-        ];
+        let corners = [[0.0; 3], [2.0, 0.0, 0.0], [2.0, 2.0, 0.0], [0.0, 2.0, 0.0], [0.0; 3]];
         let pace = Pace::default();
         let curve = drawn(&rounded(&corners, 0.05), pace);
         let (start, end) = (curve.at(0.0), curve.at(curve.duration()));
@@ -196,13 +181,9 @@ mod tests {
         let motion = Motion::new("square", curve);
         let (speed, acceleration) = motion.peaks(0.001);
         assert!(speed <= pace.max_speed && acceleration <= pace.max_acceleration);
-        assert!(
-            speed > 0.8 * pace.max_speed,
-            "the straights are drawn fast: {speed}"
-        );
-        let nearest = (0..2000)
-            .map(|i| distance(motion.at(f64::from(i) * 0.01).position, [2.0, 2.0, 0.0]))
-            .fold(f64::MAX, f64::min);
+        assert!(speed > 0.8 * pace.max_speed, "the straights are drawn fast: {speed}");
+        let nearest =
+            (0..2000).map(|i| distance(motion.at(f64::from(i) * 0.01).position, [2.0, 2.0, 0.0])).fold(f64::MAX, f64::min);
         assert!(nearest < 0.12, "corner cut by {nearest} m");
     }
 
@@ -211,10 +192,6 @@ mod tests {
         let (points, step) = resampled(&[[0.0; 3], [1.0, 0.0, 0.0], [1.0, 0.5, 0.0]], 0.01);
         assert_eq!(points.len(), 151);
         assert!((step - 0.01).abs() < 1e-12);
-        assert!(
-            points
-                .windows(2)
-                .all(|p| distance(p[0], p[1]) < 0.01 + 1e-12)
-        );
+        assert!(points.windows(2).all(|p| distance(p[0], p[1]) < 0.01 + 1e-12));
     }
 }

@@ -17,12 +17,7 @@ impl Piece {
     #[must_use]
     pub fn at(&self, t: f64) -> Sample {
         let [x, y, z, yaw] = self.coefficients.map(|c| horner(&c, t));
-        Sample {
-            position: [x[0], y[0], z[0]],
-            velocity: [x[1], y[1], z[1]],
-            acceleration: [x[2], y[2], z[2]],
-            yaw: yaw[0],
-        }
+        Sample { position: [x[0], y[0], z[0]], velocity: [x[1], y[1], z[1]], acceleration: [x[2], y[2], z[2]], yaw: yaw[0] }
     }
 }
 
@@ -75,10 +70,7 @@ impl PiecewisePolynomial {
                     scale *= interval;
                 }
             }
-            Piece {
-                duration: interval,
-                coefficients,
-            }
+            Piece { duration: interval, coefficients }
         };
         Self::new(controls.windows(6).map(piece).collect())
     }
@@ -116,11 +108,7 @@ mod tests {
         let mut coefficients = [[0.0; 8]; 4];
         coefficients[0][7] = 1.0;
         coefficients[3][1] = 2.0;
-        let sample = Piece {
-            duration: 3.0,
-            coefficients,
-        }
-        .at(2.0);
+        let sample = Piece { duration: 3.0, coefficients }.at(2.0);
         assert_eq!(sample.position[0], 128.0);
         assert_eq!(sample.velocity[0], 7.0 * 64.0);
         assert_eq!(sample.acceleration[0], 42.0 * 32.0);
@@ -129,17 +117,13 @@ mod tests {
 
     #[test]
     fn b_spline_reproduces_a_straight_line_and_joins_smoothly() {
-        let line: Vec<[f64; 3]> = (0..20)
-            .map(|i| [f64::from(i), 0.5, -f64::from(i)])
-            .collect();
+        let line: Vec<[f64; 3]> = (0..20).map(|i| [f64::from(i), 0.5, -f64::from(i)]).collect();
         let spline = PiecewisePolynomial::b_spline(&line, 0.25).expect("enough points");
         let middle = spline.at(1.0);
         assert!((middle.velocity[0] - 4.0).abs() < 1e-12 && middle.velocity[1].abs() < 1e-12);
         assert!(middle.acceleration.iter().all(|a| a.abs() < 1e-10));
 
-        let bent: Vec<[f64; 3]> = (0..20)
-            .map(|i| [f64::from(i % 3), f64::from(i % 5), 1.0])
-            .collect();
+        let bent: Vec<[f64; 3]> = (0..20).map(|i| [f64::from(i % 3), f64::from(i % 5), 1.0]).collect();
         let spline = PiecewisePolynomial::b_spline(&bent, 0.25).expect("enough points");
         for knot in 1..14 {
             let time = f64::from(knot) * 0.25;

@@ -24,13 +24,7 @@ pub struct SplineSettings {
 impl Default for SplineSettings {
     /// The strokes' room and a little more than their limits.
     fn default() -> Self {
-        Self {
-            interval: 0.7,
-            max_speed: 1.7,
-            max_acceleration: 4.5,
-            size: [5.0, 5.0, 2.4],
-            altitude: 1.7,
-        }
+        Self { interval: 0.7, max_speed: 1.7, max_acceleration: 4.5, size: [5.0, 5.0, 2.4], altitude: 1.7 }
     }
 }
 
@@ -44,28 +38,20 @@ impl Default for SplineSettings {
 pub fn random_spline(seed: u64, duration: f64, settings: &SplineSettings) -> Motion {
     let s = settings;
     let positive = [duration, s.interval, s.max_speed, s.max_acceleration];
-    assert!(
-        positive.iter().all(|x| x.is_finite() && *x > 0.0),
-        "random spline settings"
-    );
+    assert!(positive.iter().all(|x| x.is_finite() && *x > 0.0), "random spline settings");
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let count = (duration / s.interval).ceil() as usize;
     // `count` pieces need five more control points; the first and last five are the centre.
     let offsets: Vec<[f64; 3]> = (0..count + 5)
         .map(|index| {
             let point = s.size.map(|side| side * random.random_range(-0.5..0.5));
-            if index < 5 || index >= count {
-                [0.0; 3]
-            } else {
-                point
-            }
+            if index < 5 || index >= count { [0.0; 3] } else { point }
         })
         .collect();
     let spline = |scale: f64| {
         let place = |p: &[f64; 3]| [p[0] * scale, p[1] * scale, s.altitude + p[2] * scale];
         let controls: Vec<[f64; 3]> = offsets.iter().map(place).collect();
-        let spline = PiecewisePolynomial::b_spline(&controls, s.interval)
-            .expect("at least six control points");
+        let spline = PiecewisePolynomial::b_spline(&controls, s.interval).expect("at least six control points");
         Motion::new(format!("spline:{seed}"), spline)
     };
     let (speed, acceleration) = spline(1.0).peaks(s.interval / 40.0);
@@ -81,9 +67,7 @@ mod tests {
     fn limits_are_kept_and_one_is_reached() {
         let settings = SplineSettings::default();
         for seed in 0..3 {
-            let spline = random_spline(seed, 60.0, &settings)
-                .sampled(100.0)
-                .expect("rate");
+            let spline = random_spline(seed, 60.0, &settings).sampled(100.0).expect("rate");
             let speed = spline.peak_speed() / settings.max_speed;
             let acceleration = spline.peak_acceleration() / settings.max_acceleration;
             assert!(speed <= 1.0 && acceleration <= 1.0);

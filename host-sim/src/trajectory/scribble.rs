@@ -29,15 +29,10 @@ fn loops(random: &mut Xoshiro256PlusPlus) -> Vec<[f64; 2]> {
         .map(|i| {
             let part = f64::from(i) / 4000.0;
             let angle = start + TAU * turns * part + 0.5 * sin(TAU * part * 1.3 + swell[0]);
-            let height = 1.0
-                + 0.35 * sin(TAU * part * 1.7 + swell[1])
-                + 0.2 * sin(TAU * part * 3.1 + swell[2]);
+            let height = 1.0 + 0.35 * sin(TAU * part * 1.7 + swell[1]) + 0.2 * sin(TAU * part * 3.1 + swell[2]);
             let line = 0.35 * sin(TAU * part * 0.8 + swell[3]);
             let up = line + 0.7 * height * sin(angle);
-            [
-                4.0 * part + width * height * cos(angle) * side + lean * up,
-                up,
-            ]
+            [4.0 * part + width * height * cos(angle) * side + lean * up, up]
         })
         .collect()
 }
@@ -48,8 +43,7 @@ fn wander(random: &mut Xoshiro256PlusPlus) -> Vec<[f64; 2]> {
     let mut controls = vec![corners[0]; 5];
     controls.extend(&corners[1..]);
     controls.extend([corners[corners.len() - 1]; 4]);
-    let curve =
-        PiecewisePolynomial::b_spline(&controls, 1.0).expect("more than six control points");
+    let curve = PiecewisePolynomial::b_spline(&controls, 1.0).expect("more than six control points");
     (0..=6000)
         .map(|i| {
             let [x, y, _] = curve.at(curve.duration() * f64::from(i) / 6000.0).position;
@@ -70,11 +64,7 @@ fn zigzag(random: &mut Xoshiro256PlusPlus) -> Vec<[f64; 2]> {
             let part = f64::from(i) / 20.0;
             let aside = 4.0 * bow * part * (1.0 - part);
             let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
-            [
-                from[0] + part * dx - aside * dy,
-                from[1] + part * dy + aside * dx,
-                0.0,
-            ]
+            [from[0] + part * dx - aside * dy, from[1] + part * dy + aside * dx, 0.0]
         }));
     }
     let flat = |p: [f64; 3]| [p[0], p[1]];
@@ -86,11 +76,7 @@ fn curl(random: &mut Xoshiro256PlusPlus) -> Vec<[f64; 2]> {
     loop {
         let tones: [(f64, f64, f64); 5] = std::array::from_fn(|k| {
             let waves = k as f64 + random.random_range(0.5..1.5);
-            (
-                random.random_range(0.3..1.0),
-                waves,
-                random.random_range(0.0..TAU),
-            )
+            (random.random_range(0.3..1.0), waves, random.random_range(0.0..TAU))
         });
         let bias = random.random_range(-4.0..4.0);
         let strength = random.random_range(6.0..13.0);
@@ -98,15 +84,9 @@ fn curl(random: &mut Xoshiro256PlusPlus) -> Vec<[f64; 2]> {
         let path: Vec<[f64; 2]> = (0..=6000)
             .map(|i| {
                 let s = f64::from(i) / 6000.0;
-                let wave: f64 = tones
-                    .iter()
-                    .map(|&(a, n, phase)| a * sin(TAU * n * s + phase))
-                    .sum();
+                let wave: f64 = tones.iter().map(|&(a, n, phase)| a * sin(TAU * n * s + phase)).sum();
                 heading += (bias + strength * wave) / 6000.0;
-                pen = [
-                    pen[0] + cos(heading) / 6000.0,
-                    pen[1] + sin(heading) / 6000.0,
-                ];
+                pen = [pen[0] + cos(heading) / 6000.0, pen[1] + sin(heading) / 6000.0];
                 pen
             })
             .collect();
@@ -123,15 +103,8 @@ fn curl(random: &mut Xoshiro256PlusPlus) -> Vec<[f64; 2]> {
 fn apart(count: usize, gap: f64, random: &mut Xoshiro256PlusPlus) -> Vec<[f64; 3]> {
     let mut points: Vec<[f64; 3]> = Vec::with_capacity(count);
     while points.len() < count {
-        let point = [
-            random.random_range(0.0..4.0),
-            random.random_range(0.0..2.0),
-            0.0,
-        ];
-        if points
-            .last()
-            .is_none_or(|&last| super::distance(last, point) >= gap)
-        {
+        let point = [random.random_range(0.0..4.0), random.random_range(0.0..2.0), 0.0];
+        if points.last().is_none_or(|&last| super::distance(last, point) >= gap) {
             points.push(point);
         }
     }
@@ -141,31 +114,16 @@ fn apart(count: usize, gap: f64, random: &mut Xoshiro256PlusPlus) -> Vec<[f64; 3
 /// The page turned such that it is as wide as possible (found in steps of 5 degrees).
 fn turned(path: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let turn = |step: u32| {
-        let (s, c) = (
-            sin(PI * f64::from(step) / 36.0),
-            cos(PI * f64::from(step) / 36.0),
-        );
-        path.iter()
-            .map(|[x, y]| [c * x - s * y, s * x + c * y])
-            .collect::<Vec<_>>()
+        let (s, c) = (sin(PI * f64::from(step) / 36.0), cos(PI * f64::from(step) / 36.0));
+        path.iter().map(|[x, y]| [c * x - s * y, s * x + c * y]).collect::<Vec<_>>()
     };
     let width = |path: &[[f64; 2]]| extent(path)[0][1] - extent(path)[0][0];
-    (1..36).map(turn).fold(turn(0), |widest, other| {
-        if width(&other) > width(&widest) {
-            other
-        } else {
-            widest
-        }
-    })
+    (1..36).map(turn).fold(turn(0), |widest, other| if width(&other) > width(&widest) { other } else { widest })
 }
 
 /// Lowest and highest value of both coordinates.
 pub(super) fn extent(path: &[[f64; 2]]) -> [[f64; 2]; 2] {
-    std::array::from_fn(|k| {
-        path.iter().fold([f64::MAX, f64::MIN], |[low, high], p| {
-            [low.min(p[k]), high.max(p[k])]
-        })
-    })
+    std::array::from_fn(|k| path.iter().fold([f64::MAX, f64::MIN], |[low, high], p| [low.min(p[k]), high.max(p[k])]))
 }
 
 #[cfg(test)]

@@ -32,9 +32,8 @@ pub fn read_segments(source: impl Read, file: &str) -> Result<Motion, Trajectory
 
 pub(super) fn from_rows(rows: &Rows) -> Result<Motion, TrajectoryError> {
     let powers = |axis| (0..8).map(move |power| format!("{axis}^{power}"));
-    let expected: Vec<String> = std::iter::once("duration".into())
-        .chain(["x", "y", "z", "yaw"].into_iter().flat_map(powers))
-        .collect();
+    let expected: Vec<String> =
+        std::iter::once("duration".into()).chain(["x", "y", "z", "yaw"].into_iter().flat_map(powers)).collect();
     rows.expect_header(&expected, 0)?;
     let mut pieces: Vec<Piece> = Vec::new();
     for row in rows.numbers()? {
@@ -47,21 +46,15 @@ pub(super) fn from_rows(rows: &Rows) -> Result<Motion, TrajectoryError> {
         for (target, values) in coefficients.iter_mut().zip(row.values[1..].chunks_exact(8)) {
             target.copy_from_slice(values);
         }
-        let piece = Piece {
-            duration,
-            coefficients,
-        };
+        let piece = Piece { duration, coefficients };
         check_range(rows, row.line, &piece)?;
         if let Some(before) = pieces.last() {
             check_join(rows, row.line, before.at(before.duration), piece.at(0.0))?;
         }
         pieces.push(piece);
     }
-    let curve = PiecewisePolynomial::new(pieces).ok_or(TrajectoryError::TooFewRows {
-        file: rows.file.clone(),
-        found: 0,
-        needed: 1,
-    })?;
+    let curve =
+        PiecewisePolynomial::new(pieces).ok_or(TrajectoryError::TooFewRows { file: rows.file.clone(), found: 0, needed: 1 })?;
     Ok(Motion::new(rows.file.clone(), curve))
 }
 
@@ -69,11 +62,9 @@ fn check_range(rows: &Rows, line: u64, piece: &Piece) -> Result<(), TrajectoryEr
     for step in 0..=CHECKS {
         let time = piece.duration * f64::from(step) / f64::from(CHECKS);
         let sample = piece.at(time);
-        let axis =
-            (0..3).find(|&k| sample.position[k].is_nan() || sample.position[k].abs() > FARTHEST);
+        let axis = (0..3).find(|&k| sample.position[k].is_nan() || sample.position[k].abs() > FARTHEST);
         if let Some(axis) = axis {
-            let problem =
-                format!("the segment leaves ±{FARTHEST} m {time:.3} s after its beginning");
+            let problem = format!("the segment leaves ±{FARTHEST} m {time:.3} s after its beginning");
             return Err(rows.field(line, 1 + 8 * axis, problem));
         }
         if !sample.is_finite() {
@@ -94,10 +85,7 @@ fn check_join(rows: &Rows, line: u64, end: Sample, start: Sample) -> Result<(), 
         jumps.push((column + 1, velocity, VELOCITY_TOLERANCE, "m/s"));
     }
     jumps.push((25, start.yaw - end.yaw, YAW_TOLERANCE, "rad"));
-    match jumps
-        .into_iter()
-        .find(|(_, jump, tolerance, _)| jump.abs() > *tolerance)
-    {
+    match jumps.into_iter().find(|(_, jump, tolerance, _)| jump.abs() > *tolerance) {
         Some((column, jump, tolerance, unit)) => Err(TrajectoryError::Join {
             file: rows.file.clone(),
             line,
@@ -126,16 +114,13 @@ mod tests {
     }
 
     fn error(rows: &[&str]) -> String {
-        read_segments(text(rows).as_bytes(), "f.csv")
-            .expect_err("refused")
-            .to_string()
+        read_segments(text(rows).as_bytes(), "f.csv").expect_err("refused").to_string()
     }
 
     #[test]
     fn two_segments_are_flown_one_after_the_other() {
         let (first, second) = (row("2", "0,0.5", "1"), row("1.5", "1,0.5", "1"));
-        let motion =
-            read_segments(text(&[&first, &second]).as_bytes(), "f.csv").expect("good file");
+        let motion = read_segments(text(&[&first, &second]).as_bytes(), "f.csv").expect("good file");
         assert_eq!(motion.duration(), 3.5);
         let sample = motion.at(3.0);
         assert!((sample.position[0] - 1.5).abs() < 1e-12 && sample.position[2] == 1.0);
@@ -148,22 +133,12 @@ mod tests {
         assert!(error(&[]).contains("0 rows"));
         assert!(error(&[&row("0", "0,0", "1")]).contains("line 2, field `duration`"));
         assert!(error(&[&row("-1", "0,0", "1")]).contains("0.001 s at least"));
-        assert!(
-            error(&[&good, &row("1", "NaN,0", "1")])
-                .contains("line 3, field `x^0`: `NaN` is not a finite")
-        );
+        assert!(error(&[&good, &row("1", "NaN,0", "1")]).contains("line 3, field `x^0`: `NaN` is not a finite"));
         assert!(error(&[&good, &row("1", "1,0.5", "inf")]).contains("line 3, field `z^0`"));
-        assert!(
-            error(&[&good, &row("1", "1,abc", "1")]).contains("field `x^1`: `abc` is not a number")
-        );
-        assert!(
-            error(&[&good, &row("1", "1.02,0.5", "1")])
-                .contains("line 3, field `x^0`: the segment begins 0.02")
-        );
+        assert!(error(&[&good, &row("1", "1,abc", "1")]).contains("field `x^1`: `abc` is not a number"));
+        assert!(error(&[&good, &row("1", "1.02,0.5", "1")]).contains("line 3, field `x^0`: the segment begins 0.02"));
         assert!(error(&[&good, &row("1", "1,0.6", "1")]).contains("field `x^1`"));
-        assert!(
-            error(&["1,2,3"]).contains("line 2: 3 columns, the header has 33; `x^2` is missing")
-        );
+        assert!(error(&["1,2,3"]).contains("line 2: 3 columns, the header has 33; `x^2` is missing"));
         assert!(error(&[&format!("{good},7")]).contains("column 34 is surplus"));
         assert!(error(&[&row("1e9", "0,1", "1")]).contains("field `x^0`: the segment leaves"));
         assert!(error(&[&row("1", "0,1e308", "1")]).contains("line 2"));

@@ -34,11 +34,7 @@ impl Shape {
                 return [t - self.ramp / 2.0, 1.0, 0.0];
             }
             let [rate, slope, _] = smooth_step(x);
-            [
-                self.ramp * smooth_step_integral(x.max(0.0)),
-                rate,
-                slope / self.ramp,
-            ]
+            [self.ramp * smooth_step_integral(x.max(0.0)), rate, slope / self.ramp]
         };
         let half = self.duration() / 2.0;
         let [phase, rate, slope] = if seconds <= half {
@@ -75,16 +71,9 @@ impl Curve for Shape {
 
 /// A shape from its sinusoids (amplitude m, whole-number rate, phase rad), seconds a lap and laps.
 fn shape(name: &str, tones: [&[(f64, f64, f64)]; 3], period: f64, laps: f64) -> Shape {
-    assert!(
-        period > 0.0 && laps > 0.0 && (period * laps).is_finite(),
-        "{name}: period and laps are positive"
-    );
+    assert!(period > 0.0 && laps > 0.0 && (period * laps).is_finite(), "{name}: period and laps are positive");
     let tones = tones.map(|list| {
-        let tone = |&(amplitude, rate, phase): &(f64, f64, f64)| Tone {
-            amplitude,
-            rate,
-            phase,
-        };
+        let tone = |&(amplitude, rate, phase): &(f64, f64, f64)| Tone { amplitude, rate, phase };
         list.iter().map(tone).collect()
     });
     Shape {
@@ -117,8 +106,7 @@ pub fn figure_eight(width: f64, height: f64, period: f64, laps: f64) -> Motion {
 /// Lissajous curve: size m (whole width in x, y, z) and whole numbers of swings a lap.
 #[must_use]
 pub fn lissajous(size: [f64; 3], swings: [u32; 3], period: f64, laps: f64) -> Motion {
-    let [x, y, z]: [[(f64, f64, f64); 1]; 3] =
-        std::array::from_fn(|axis| [(size[axis] / 2.0, f64::from(swings[axis]), 0.0)]);
+    let [x, y, z]: [[(f64, f64, f64); 1]; 3] = std::array::from_fn(|axis| [(size[axis] / 2.0, f64::from(swings[axis]), 0.0)]);
     Motion::new("lissajous", shape("lissajous", [&x, &y, &z], period, laps))
 }
 
@@ -152,17 +140,10 @@ pub fn trefoil(size: f64, period: f64, laps: f64) -> Motion {
 /// With fewer than 3 points or a radius that is not positive.
 #[must_use]
 pub fn star(points: u32, radius: f64, inner: f64, pace: Pace) -> Motion {
-    assert!(
-        points >= 3 && radius > 0.0,
-        "a star has 3 points and a positive radius"
-    );
+    assert!(points >= 3 && radius > 0.0, "a star has 3 points and a positive radius");
     let corner = |index: u32| {
         let angle = TAU * f64::from(index) / f64::from(2 * points);
-        let reach = if index.is_multiple_of(2) {
-            radius
-        } else {
-            radius * inner
-        };
+        let reach = if index.is_multiple_of(2) { radius } else { radius * inner };
         [reach * cos(angle), reach * sin(angle), ALTITUDE]
     };
     let corners: Vec<[f64; 3]> = (0..=2 * points).map(corner).collect();

@@ -37,9 +37,7 @@ pub(super) fn smoothed(times: &[f64], values: &[f64], time_constant: f64) -> (Ve
         diagonal[j] = (gaps[j] + gaps[j + 1]) / 3.0 + own;
         if j + 1 < inner {
             let next = column(j + 1);
-            first[j] = gaps[j + 1] / 6.0
-                + q[1] * next[0] * penalty[j + 1]
-                + q[2] * next[1] * penalty[j + 2];
+            first[j] = gaps[j + 1] / 6.0 + q[1] * next[0] * penalty[j + 1] + q[2] * next[1] * penalty[j + 2];
         }
         if j + 2 < inner {
             second[j] = q[2] * column(j + 2)[0] * penalty[j + 2];
@@ -104,12 +102,7 @@ mod tests {
         let times = [0.0, 0.01, 0.5, 0.7, 3.0, 3.2];
         let values = times.map(|t| 2.0 - 3.0 * t);
         let (fitted, curvature) = smoothed(&times, &values, 0.03);
-        assert!(
-            fitted
-                .iter()
-                .zip(values)
-                .all(|(a, b)| (a - b).abs() < 1e-12)
-        );
+        assert!(fitted.iter().zip(values).all(|(a, b)| (a - b).abs() < 1e-12));
         assert!(curvature.iter().all(|c| c.abs() < 1e-9));
     }
 
@@ -132,18 +125,11 @@ mod tests {
     fn rounding_to_millimetres_does_not_reach_the_acceleration() {
         let times: Vec<f64> = (0..500).map(|i| f64::from(i) * 0.01).collect();
         let exact = |t: f64| (3.0 * t).sin();
-        let values: Vec<f64> = times
-            .iter()
-            .map(|&t| (exact(t) * 1000.0).round() / 1000.0)
-            .collect();
+        let values: Vec<f64> = times.iter().map(|&t| (exact(t) * 1000.0).round() / 1000.0).collect();
         let (fitted, curvature) = smoothed(&times, &values, 0.03);
         for i in 20..480 {
             assert!((fitted[i] - exact(times[i])).abs() < 6e-4);
-            assert!(
-                (curvature[i] + 9.0 * exact(times[i])).abs() < 0.4,
-                "{}",
-                curvature[i]
-            );
+            assert!((curvature[i] + 9.0 * exact(times[i])).abs() < 0.4, "{}", curvature[i]);
         }
     }
 }

@@ -34,15 +34,8 @@ const DURATION: std::ops::RangeInclusive<f64> = 8.0..=20.0;
 ///
 /// # Panics
 /// When the speed is not positive and finite.
-pub fn strokes(
-    seed: u64,
-    count: usize,
-    speed: f64,
-    rate_hz: f64,
-) -> Result<Vec<Trajectory>, TrajectoryError> {
-    (0..count as u64)
-        .map(|index| stroke(seed, index).scaled(speed).sampled(rate_hz))
-        .collect()
+pub fn strokes(seed: u64, count: usize, speed: f64, rate_hz: f64) -> Result<Vec<Trajectory>, TrajectoryError> {
+    (0..count as u64).map(|index| stroke(seed, index).scaled(speed).sampled(rate_hz)).collect()
 }
 
 /// One stroke at normal speed. Seed and index alone decide.
@@ -70,11 +63,7 @@ fn placed(path: &[[f64; 2]], depth: bool, random: &mut Xoshiro256PlusPlus) -> Ve
     let size = [random.random_range(3.4..4.0), random.random_range(1.5..2.0)];
     let heading = random.random_range(0.0..TAU);
     let (s, c) = (sin(heading), cos(heading));
-    let amplitude = if depth {
-        random.random_range(0.3..0.7)
-    } else {
-        0.0
-    };
+    let amplitude = if depth { random.random_range(0.3..0.7) } else { 0.0 };
     let (waves, phase) = (random.random_range(0.6..1.6), random.random_range(0.0..TAU));
     let [[left, right], [low, high]] = extent(path);
     let count = path.len() as f64;
@@ -84,11 +73,7 @@ fn placed(path: &[[f64; 2]], depth: bool, random: &mut Xoshiro256PlusPlus) -> Ve
             let along = size[0] * ((x - left) / (right - left) - 0.5);
             let up = size[1] * ((y - low) / (high - low) - 0.5);
             let across = amplitude * sin(TAU * waves * index as f64 / count + phase);
-            [
-                c * along - s * across,
-                s * along + c * across,
-                CENTRE_HEIGHT + up,
-            ]
+            [c * along - s * across, s * along + c * across, CENTRE_HEIGHT + up]
         })
         .collect()
 }
@@ -165,9 +150,6 @@ mod tests {
         let more = strokes(9, 4, 1.0, 100.0).expect("rate");
         assert_eq!(few[..], more[..2]);
         assert_ne!(more[0].samples, more[1].samples);
-        assert_ne!(
-            few[0].samples,
-            stroke(10, 0).sampled(100.0).expect("rate").samples
-        );
+        assert_ne!(few[0].samples, stroke(10, 0).sampled(100.0).expect("rate").samples);
     }
 }

@@ -36,11 +36,7 @@ pub(super) fn from_rows(rows: &Rows) -> Result<Motion, TrajectoryError> {
     rows.expect_header(&["t", "x", "y", "z", "yaw"].map(String::from), 1)?;
     let table = rows.numbers()?;
     if table.len() < FEWEST_ROWS {
-        return Err(TrajectoryError::TooFewRows {
-            file: rows.file.clone(),
-            found: table.len(),
-            needed: FEWEST_ROWS,
-        });
+        return Err(TrajectoryError::TooFewRows { file: rows.file.clone(), found: table.len(), needed: FEWEST_ROWS });
     }
     for row in &table {
         check_range(rows, row)?;
@@ -48,22 +44,13 @@ pub(super) fn from_rows(rows: &Rows) -> Result<Motion, TrajectoryError> {
     for pair in table.windows(2) {
         let (before, now) = (pair[0].values[0], pair[1].values[0]);
         if now - before < SHORTEST_GAP {
-            let problem =
-                format!("{now} follows {before}; the times must grow by {SHORTEST_GAP} s at least");
+            let problem = format!("{now} follows {before}; the times must grow by {SHORTEST_GAP} s at least");
             return Err(rows.field(pair[1].line, 0, problem));
         }
     }
-    let times: Vec<f64> = table
-        .iter()
-        .map(|row| row.values[0] - table[0].values[0])
-        .collect();
-    let mut pieces: Vec<Piece> = times
-        .windows(2)
-        .map(|pair| Piece {
-            duration: pair[1] - pair[0],
-            coefficients: [[0.0; 8]; 4],
-        })
-        .collect();
+    let times: Vec<f64> = table.iter().map(|row| row.values[0] - table[0].values[0]).collect();
+    let mut pieces: Vec<Piece> =
+        times.windows(2).map(|pair| Piece { duration: pair[1] - pair[0], coefficients: [[0.0; 8]; 4] }).collect();
     for axis in 0..rows.header.len() - 1 {
         let mut values: Vec<f64> = table.iter().map(|row| row.values[axis + 1]).collect();
         if axis == 3 {
@@ -101,9 +88,7 @@ mod tests {
     use super::*;
 
     fn error(text: &str) -> String {
-        read_table(text.as_bytes(), "f.csv")
-            .expect_err("refused")
-            .to_string()
+        read_table(text.as_bytes(), "f.csv").expect_err("refused").to_string()
     }
 
     #[test]
@@ -122,11 +107,7 @@ mod tests {
             assert!((sample.position[0] - t.sin()).abs() < 1e-4);
             assert!((sample.velocity[1] + 2.0 * (2.0 * t).sin()).abs() < 5e-3);
             assert!((sample.acceleration[1] + 4.0 * (2.0 * t).cos()).abs() < 0.05);
-            assert!(
-                (sample.yaw - t).abs() < 1e-3,
-                "unwrapped: {} at {t}",
-                sample.yaw
-            );
+            assert!((sample.yaw - t).abs() < 1e-3, "unwrapped: {} at {t}", sample.yaw);
         }
     }
 

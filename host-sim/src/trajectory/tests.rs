@@ -29,22 +29,12 @@ fn velocity_and_acceleration_are_the_derivatives_of_position() {
         let count = (motion.duration() / 0.0371) as usize;
         for i in 1..count {
             let time = i as f64 * 0.0371;
-            let (before, here, after) = (
-                motion.at(time - STEP),
-                motion.at(time),
-                motion.at(time + STEP),
-            );
+            let (before, here, after) = (motion.at(time - STEP), motion.at(time), motion.at(time + STEP));
             for k in 0..3 {
                 let velocity = (after.position[k] - before.position[k]) / (2.0 * STEP);
                 let acceleration = (after.velocity[k] - before.velocity[k]) / (2.0 * STEP);
-                assert!(
-                    (velocity - here.velocity[k]).abs() < 1e-5,
-                    "{name} at {time}"
-                );
-                assert!(
-                    (acceleration - here.acceleration[k]).abs() < 1e-3,
-                    "{name} at {time}"
-                );
+                assert!((velocity - here.velocity[k]).abs() < 1e-5, "{name} at {time}");
+                assert!((acceleration - here.acceleration[k]).abs() < 1e-3, "{name} at {time}");
             }
         }
     }
@@ -54,23 +44,11 @@ fn velocity_and_acceleration_are_the_derivatives_of_position() {
 fn acceleration_is_continuous_from_hover_to_hover() {
     for name in NAMES {
         let trajectory = Trajectory::by_name(name, 1000.0).expect(name);
-        let ends = [
-            trajectory.samples[0],
-            trajectory.samples[trajectory.samples.len() - 1],
-        ];
-        assert!(
-            ends.iter()
-                .all(|s| norm(s.velocity) == 0.0 && norm(s.acceleration) == 0.0)
-        );
+        let ends = [trajectory.samples[0], trajectory.samples[trajectory.samples.len() - 1]];
+        assert!(ends.iter().all(|s| norm(s.velocity) == 0.0 && norm(s.acceleration) == 0.0));
         for pair in trajectory.samples.windows(2) {
-            assert!(
-                distance(pair[0].acceleration, pair[1].acceleration) < 0.06,
-                "{name}"
-            );
-            assert!(
-                distance(pair[0].velocity, pair[1].velocity) < 0.01,
-                "{name}"
-            );
+            assert!(distance(pair[0].acceleration, pair[1].acceleration) < 0.06, "{name}");
+            assert!(distance(pair[0].velocity, pair[1].velocity) < 0.01, "{name}");
             assert!(pair[0].position[2] > 0.0, "{name}");
         }
     }
@@ -88,18 +66,10 @@ fn the_drawn_part_lies_between_the_hovers() {
 #[test]
 fn before_and_after_the_end_points_are_held_at_rest() {
     let text = "t,x,y,z\n0,0,0,1\n1,1,0,1\n2,2,0,1\n3,3,0,1\n";
-    let trajectory = read(text.as_bytes(), "line.csv")
-        .and_then(|m| m.sampled(50.0))
-        .expect("good");
+    let trajectory = read(text.as_bytes(), "line.csv").and_then(|m| m.sampled(50.0)).expect("good");
     let inside = trajectory.sample_at(50 + 75);
     assert!((inside.position[0] - 1.5).abs() < 1e-12 && (inside.velocity[0] - 1.0).abs() < 1e-12);
-    for (tick, x) in [
-        (i64::MIN, 0.0),
-        (-1, 0.0),
-        (0, 0.0),
-        (100_000, 3.0),
-        (i64::MAX, 3.0),
-    ] {
+    for (tick, x) in [(i64::MIN, 0.0), (-1, 0.0), (0, 0.0), (100_000, 3.0), (i64::MAX, 3.0)] {
         let held = trajectory.sample_at(tick);
         assert!((held.position[0] - x).abs() < 1e-12, "{tick}");
         assert_eq!((held.velocity, held.acceleration), ([0.0; 3], [0.0; 3]));
@@ -118,12 +88,7 @@ fn strokes_never_change() {
             digest.update(&number.to_bits().to_le_bytes());
         }
     }
-    assert_eq!(
-        digest.finalize(),
-        4_432_953_872_713_052_210,
-        "stroke of {} samples",
-        stroke.samples.len()
-    );
+    assert_eq!(digest.finalize(), 4_432_953_872_713_052_210, "stroke of {} samples", stroke.samples.len());
 }
 
 #[test]
@@ -139,33 +104,20 @@ fn names_are_refused_with_the_list_of_known_ones() {
         ("tone:w", "expected x, y or z"),
     ] {
         let error = by_name(name).expect_err(name).to_string();
-        assert!(
-            error.contains(part) && error.contains("letters:TEXT"),
-            "{error}"
-        );
+        assert!(error.contains(part) && error.contains("letters:TEXT"), "{error}");
     }
     for rate in [0.0, -1.0, f64::NAN, 1e6] {
-        assert!(matches!(
-            Trajectory::by_name("circle", rate),
-            Err(TrajectoryError::Rate { .. })
-        ));
+        assert!(matches!(Trajectory::by_name("circle", rate), Err(TrajectoryError::Rate { .. })));
     }
     let error = Trajectory::load(Path::new("no/such/file.csv"), 100.0).expect_err("absent");
-    assert!(
-        error
-            .to_string()
-            .contains("no/such/file.csv: cannot be read")
-    );
+    assert!(error.to_string().contains("no/such/file.csv: cannot be read"));
 }
 
 #[test]
 fn a_file_that_lasts_for_ever_is_refused() {
     let text = "t,x,y,z\n0,0,0,1\n1,1,0,1\n2,2,0,1\n1e300,3,0,1\n";
     let motion = read(text.as_bytes(), "long.csv").expect("finite numbers");
-    assert!(matches!(
-        motion.sampled(100.0),
-        Err(TrajectoryError::TooLong { .. })
-    ));
+    assert!(matches!(motion.sampled(100.0), Err(TrajectoryError::TooLong { .. })));
 }
 
 /// Fields as they appear in broken files.
@@ -183,10 +135,7 @@ fn nearly_right() -> impl Strategy<Value = String> {
     let row = |columns: usize| prop::collection::vec(field(), columns.saturating_sub(1)..=columns);
     let rows = |columns: usize| prop::collection::vec(row(columns), 0..8);
     let table = rows(4).prop_map(|rows| {
-        let lines = rows
-            .iter()
-            .enumerate()
-            .map(|(t, row)| format!("{t},{}\n", row.join(",")));
+        let lines = rows.iter().enumerate().map(|(t, row)| format!("{t},{}\n", row.join(",")));
         format!("t,x,y,z,yaw\n{}", lines.collect::<String>())
     });
     let segments = rows(33).prop_map(|rows| {

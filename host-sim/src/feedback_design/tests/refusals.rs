@@ -18,14 +18,8 @@ fn logs_with_dither_pass_with_and_without_noise() {
 
 #[test]
 fn logs_without_dither_are_refused_with_and_without_noise() {
-    let flight = Flight {
-        dither: 0.0,
-        ..short(Flight::collecting())
-    };
-    let with_lane = |flight: Flight| Flight {
-        lane: Some(LaneGain::pd(1.0, 0.4)),
-        ..flight
-    };
+    let flight = Flight { dither: 0.0, ..short(Flight::collecting()) };
+    let with_lane = |flight: Flight| Flight { lane: Some(LaneGain::pd(1.0, 0.4)), ..flight };
     for flight in [
         noise_free(flight.clone()),
         flight.clone(),
@@ -36,37 +30,19 @@ fn logs_without_dither_are_refused_with_and_without_noise() {
     ] {
         let data = collect(&fly(&flight));
         let refusal = design(&data, &settings()).unwrap_err();
-        assert!(
-            matches!(refusal, DesignRefusal::NoExcitation { .. }),
-            "{refusal}"
-        );
+        assert!(matches!(refusal, DesignRefusal::NoExcitation { .. }), "{refusal}");
     }
     // Clamps make it a nonlinear function of the noise, which a linear prediction cannot explain: too weak all the same.
-    let clamped = Flight {
-        limits: [0.003, 0.01],
-        ..with_lane(flight).rough()
-    };
+    let clamped = Flight { limits: [0.003, 0.01], ..with_lane(flight).rough() };
     let refusal = design(&collect(&fly(&clamped)), &settings()).unwrap_err();
-    assert!(
-        matches!(
-            refusal,
-            DesignRefusal::NoExcitation { .. } | DesignRefusal::WeakExcitation { .. }
-        ),
-        "{refusal}"
-    );
+    assert!(matches!(refusal, DesignRefusal::NoExcitation { .. } | DesignRefusal::WeakExcitation { .. }), "{refusal}");
 }
 
 #[test]
 fn a_dither_too_weak_for_the_sensors_is_refused() {
-    let flight = Flight {
-        dither: 0.003,
-        ..short(Flight::collecting()).rough()
-    };
+    let flight = Flight { dither: 0.003, ..short(Flight::collecting()).rough() };
     let refusal = design(&collect(&fly(&flight)), &settings()).unwrap_err();
-    assert!(
-        matches!(refusal, DesignRefusal::WeakExcitation { .. }),
-        "{refusal}"
-    );
+    assert!(matches!(refusal, DesignRefusal::WeakExcitation { .. }), "{refusal}");
 }
 
 #[test]
@@ -80,21 +56,14 @@ fn a_logged_dither_that_is_not_in_the_reference_is_refused() {
         axis.dither = Some(dither);
         let data = IdentificationData::collect(&[axis], 25).unwrap();
         let refusal = design(&data, &settings()).unwrap_err();
-        assert!(
-            matches!(refusal, DesignRefusal::DitherNotInReference { .. }),
-            "{refusal}"
-        );
+        assert!(matches!(refusal, DesignRefusal::DitherNotInReference { .. }), "{refusal}");
     }
 }
 
 #[test]
 fn bad_logs_and_settings_are_refused_by_name() {
     let log = fly(&short(Flight::collecting()));
-    let refusal = |axis: AxisLog| {
-        IdentificationData::collect(&[log.axis(), axis], 25)
-            .unwrap_err()
-            .to_string()
-    };
+    let refusal = |axis: AxisLog| IdentificationData::collect(&[log.axis(), axis], 25).unwrap_err().to_string();
     let mut axis = log.axis();
     axis.reference_velocity = &log.reference_velocity[1..];
     assert!(refusal(axis).contains("log 1: `reference_velocity` has 4499 samples"));

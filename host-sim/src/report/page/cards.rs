@@ -30,20 +30,14 @@ pub(super) fn headline(cases: &[Case<'_>]) -> Markup {
 pub(super) fn groups<'a, 'b>(cases: &'a [Case<'b>]) -> Vec<Vec<&'a Case<'b>>> {
     let mut groups: Vec<Vec<&Case<'_>>> = Vec::new();
     for case in cases {
-        match groups
-            .iter_mut()
-            .find(|group| group[0].vehicle == case.vehicle && group[0].gains == case.gains)
-        {
+        match groups.iter_mut().find(|group| group[0].vehicle == case.vehicle && group[0].gains == case.gains) {
             Some(group) => group.push(case),
             None => groups.push(vec![case]),
         }
     }
     for group in &mut groups {
         let distance = |case: &Case<'_>| (case.speed - 1.0).abs();
-        let nearest = group
-            .iter()
-            .map(|case| distance(case))
-            .fold(f64::INFINITY, f64::min);
+        let nearest = group.iter().map(|case| distance(case)).fold(f64::INFINITY, f64::min);
         // `total_cmp` keeps a group whose speeds are all not a number.
         group.retain(|case| !distance(case).total_cmp(&nearest).is_gt() || nearest.is_infinite());
     }
@@ -51,14 +45,7 @@ pub(super) fn groups<'a, 'b>(cases: &'a [Case<'b>]) -> Vec<Vec<&'a Case<'b>>> {
 }
 
 fn headline_row<'a>(case: &Case<'a>) -> Option<&'a Row> {
-    [
-        Method::FullInt8,
-        Method::FullF32,
-        Method::NetInt8,
-        Method::NetF32,
-    ]
-    .into_iter()
-    .find_map(|method| case.row(method))
+    [Method::FullInt8, Method::FullF32, Method::NetInt8, Method::NetF32].into_iter().find_map(|method| case.row(method))
 }
 
 fn card(case: &Case<'_>) -> Markup {

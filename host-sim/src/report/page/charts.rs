@@ -23,10 +23,7 @@ pub(super) fn sections(
         let named = html! { (name) ", " (speed(group[0].speed)) " speed" };
         let (mut reduction, mut error, mut fast) = (Vec::new(), Vec::new(), Vec::new());
         for case in group {
-            reduction.extend(
-                plots::reduction_by_method(case, methods)?
-                    .map(|svg| figure(case.condition, "", &svg)),
-            );
+            reduction.extend(plots::reduction_by_method(case, methods)?.map(|svg| figure(case.condition, "", &svg)));
             let distribution = plots::error_distribution(case, methods, &results.per_flight)?;
             error.extend(distribution.map(|svg| figure(case.condition, "", &svg)));
             let same: Vec<&Case<'_>> = cases
@@ -36,9 +33,7 @@ pub(super) fn sections(
                         == (case.vehicle, case.gains, case.condition, case.seed)
                 })
                 .collect();
-            fast.extend(
-                plots::reduction_by_speed(&same)?.map(|svg| figure(case.condition, "", &svg)),
-            );
+            fast.extend(plots::reduction_by_speed(&same)?.map(|svg| figure(case.condition, "", &svg)));
         }
         reductions.push((named.clone(), reduction));
         errors.push((named, error));
@@ -90,10 +85,7 @@ fn paths(scenes: &[Scene<'_>]) -> anyhow::Result<Markup> {
     let mut panels = Vec::new();
     for scene in scenes.iter().take(PATHS) {
         let first = scene.first();
-        panels.extend(
-            plots::path_in_space(scene)?
-                .map(|svg| figure(&first.trajectory, &circumstances(first), &svg)),
-        );
+        panels.extend(plots::path_in_space(scene)?.map(|svg| figure(&first.trajectory, &circumstances(first), &svg)));
     }
     Ok(section(
         "Paths in space",
@@ -107,16 +99,12 @@ fn paths(scenes: &[Scene<'_>]) -> anyhow::Result<Markup> {
 
 /// The first trajectory that flew with and without the add-on, or else the first one.
 fn one_flight(scenes: &[Scene<'_>]) -> anyhow::Result<Markup> {
-    let complete = scenes
-        .iter()
-        .find(|scene| scene.baseline().is_some() && scene.add_on().is_some());
+    let complete = scenes.iter().find(|scene| scene.baseline().is_some() && scene.add_on().is_some());
     let Some(scene) = complete.or(scenes.first()) else {
         return Ok(html! {});
     };
     let first = scene.first();
-    let add_on = scene.add_on().map_or_else(String::new, |trace| {
-        format!(", add-on: {}", trace.method.label())
-    });
+    let add_on = scene.add_on().map_or_else(String::new, |trace| format!(", add-on: {}", trace.method.label()));
     let positions = plots::position_over_time(scene)?;
     let errors = plots::error_over_time(scene)?;
     let corrections = plots::correction_over_time(scene)?;

@@ -67,9 +67,7 @@ pub fn render_html(results: &Results) -> anyhow::Result<String> {
 /// When a plot cannot be drawn or the file cannot be written; the message names the file.
 pub fn write_html(results: &Results, path: &Path) -> anyhow::Result<()> {
     let page = render_html(results)?;
-    let name = path
-        .file_name()
-        .with_context(|| format!("'{}' does not name a file for the report", path.display()))?;
+    let name = path.file_name().with_context(|| format!("'{}' does not name a file for the report", path.display()))?;
     let mut partial = name.to_owned();
     partial.push(format!(".{}.partial", std::process::id()));
     let partial = path.with_file_name(partial);

@@ -2,9 +2,7 @@
 
 use crate::report::cases::Case;
 use crate::report::method::Method;
-use crate::report::notation::{
-    NOT_AVAILABLE, centimetres_with_unit, mean_and_worst, speed, with_minus_sign,
-};
+use crate::report::notation::{NOT_AVAILABLE, centimetres_with_unit, mean_and_worst, speed, with_minus_sign};
 use crate::report::results::Row;
 use maud::{Markup, html};
 

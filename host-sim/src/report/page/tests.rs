@@ -20,45 +20,23 @@ fn the_page_of_a_whole_run_is_complete_small_and_well_formed() {
     if let Some(preview) = std::env::var_os("REPORT_PREVIEW") {
         fs::write(preview, &page).unwrap();
     }
-    assert_eq!(
-        fs::read_dir(directory.path()).unwrap().count(),
-        1,
-        "a partial file is left"
-    );
+    assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1, "a partial file is left");
     assert!(page.len() < 3_000_000, "{} bytes", page.len());
     let document = roxmltree::Document::parse(body(&page)).unwrap();
-    let count = |name: &str| {
-        document
-            .descendants()
-            .filter(|node| node.has_tag_name(name))
-            .count()
-    };
+    let count = |name: &str| document.descendants().filter(|node| node.has_tag_name(name)).count();
     // Two vehicles, four conditions: by method, by flight, by speed; six paths; 3 + 2 + 3 panels of one flight.
     let svg = ("http://www.w3.org/2000/svg", "svg");
-    assert_eq!(
-        document
-            .descendants()
-            .filter(|node| node.has_tag_name(svg))
-            .count(),
-        3 * 8 + 6 + 8
-    );
+    assert_eq!(document.descendants().filter(|node| node.has_tag_name(svg)).count(), 3 * 8 + 6 + 8);
     assert_eq!((count("table"), count("tbody")), (3, 4));
-    for heading in document
-        .descendants()
-        .filter(|node| node.has_tag_name("th"))
-    {
+    for heading in document.descendants().filter(|node| node.has_tag_name("th")) {
         assert!(heading.has_attribute("scope"));
     }
 }
 
 #[test]
 fn nothing_is_loaded_from_elsewhere() {
-    let page = render_html(&fixture::full())
-        .unwrap()
-        .replace("xmlns=\"http://www.w3.org/2000/svg\"", "");
-    for forbidden in [
-        "http:", "https:", "//", "url(", "@import", "<script", "<link", "src=", "href=",
-    ] {
+    let page = render_html(&fixture::full()).unwrap().replace("xmlns=\"http://www.w3.org/2000/svg\"", "");
+    for forbidden in ["http:", "https:", "//", "url(", "@import", "<script", "<link", "src=", "href="] {
         assert!(!page.contains(forbidden), "{forbidden}");
     }
 }
@@ -87,8 +65,7 @@ fn names_cannot_inject_markup() {
 fn numbers_that_are_not_finite_are_shown_as_not_available() {
     let mut results = fixture::full();
     for row in &mut results.table {
-        (row.rms_cm_mean, row.reduction_mean, row.reduction_worst) =
-            (f64::NAN, f64::INFINITY, f64::NEG_INFINITY);
+        (row.rms_cm_mean, row.reduction_mean, row.reduction_worst) = (f64::NAN, f64::INFINITY, f64::NEG_INFINITY);
         row.speed = f64::NAN;
     }
     for flight in &mut results.per_flight {

@@ -9,9 +9,7 @@ pub(super) fn definitions(results: &Results, methods: &[Method]) -> Markup {
     let mut conditions: Vec<(&str, String)> = Vec::new();
     for row in &results.table {
         if conditions.iter().all(|(name, _)| *name != row.condition) {
-            conditions.extend(
-                in_words(results, &row.condition).map(|words| (row.condition.as_str(), words)),
-            );
+            conditions.extend(in_words(results, &row.condition).map(|words| (row.condition.as_str(), words)));
         }
     }
     html! {
@@ -41,11 +39,7 @@ pub(super) fn definitions(results: &Results, methods: &[Method]) -> Markup {
 
 /// The run's own definition, or else that of a usual name; `None` for an unknown one.
 fn in_words(results: &Results, condition: &str) -> Option<String> {
-    if let Some((_, words)) = results
-        .conditions
-        .iter()
-        .find(|(name, _)| name == condition)
-    {
+    if let Some((_, words)) = results.conditions.iter().find(|(name, _)| name == condition) {
         return Some(words.clone());
     }
     if let Some((nominal, delay)) = condition.split_once('+') {

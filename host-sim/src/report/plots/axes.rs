@@ -6,8 +6,7 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use std::ops::Range;
 
-pub(super) type Chart<'a, 'b> =
-    ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+pub(super) type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 /// Room for the labels at the left and the bottom, in pixels.
 pub(super) const LEFT: f64 = 50.0;
@@ -23,10 +22,7 @@ pub(super) struct Labels<'a> {
 
 /// The plotting area's size in pixels in a panel of the given size.
 pub(super) fn inner_size((width, height): (u32, u32)) -> (f64, f64) {
-    (
-        f64::from(width) - LEFT - RIGHT,
-        f64::from(height) - BOTTOM - TOP,
-    )
+    (f64::from(width) - LEFT - RIGHT, f64::from(height) - BOTTOM - TOP)
 }
 
 /// Draws axes over the whole of `area`; both ranges must be finite and not empty.
@@ -37,8 +33,7 @@ pub(super) fn axes<'a, 'b>(
     labels: &Labels<'_>,
 ) -> Result<Chart<'a, 'b>, DrawingAreaErrorKind<std::io::Error>> {
     let (width, height) = area.dim_in_pixel();
-    let ticks =
-        |units: u32, pixels: u32| (units / UNITS_PER_PIXEL.unsigned_abs() / pixels).max(3) as usize;
+    let ticks = |units: u32, pixels: u32| (units / UNITS_PER_PIXEL.unsigned_abs() / pixels).max(3) as usize;
     let decimals = (decimals(&x), decimals(&y));
     let mut chart = ChartBuilder::on(area)
         .margin_top(units(TOP))
@@ -75,15 +70,8 @@ pub(super) fn curve(chart: &mut Chart<'_, '_>, points: &[Point], style: ShapeSty
     let (x, y) = (chart.x_range(), chart.y_range());
     let (width, height) = chart.plotting_area().dim_in_pixel();
     let fifth = 0.2 * f64::from(UNITS_PER_PIXEL);
-    let tolerance = (
-        (x.end - x.start) / f64::from(width) * fifth,
-        (y.end - y.start) / f64::from(height) * fifth,
-    );
-    chart.draw_series(
-        polylines(points, tolerance)
-            .into_iter()
-            .map(|line| PathElement::new(line, style)),
-    )?;
+    let tolerance = ((x.end - x.start) / f64::from(width) * fifth, (y.end - y.start) / f64::from(height) * fifth);
+    chart.draw_series(polylines(points, tolerance).into_iter().map(|line| PathElement::new(line, style)))?;
     Ok(())
 }
 
@@ -93,13 +81,6 @@ mod tests {
 
     #[test]
     fn neighbouring_ticks_have_different_labels() {
-        assert_eq!(
-            (
-                decimals(&(0.0..400.0)),
-                decimals(&(0.0..3.0)),
-                decimals(&(0.0..0.1))
-            ),
-            (0, 1, 2)
-        );
+        assert_eq!((decimals(&(0.0..400.0)), decimals(&(0.0..3.0)), decimals(&(0.0..0.1))), (0, 1, 2));
     }
 }

@@ -53,11 +53,7 @@ impl Ink {
     }
 
     pub(super) fn line(self, pixels: f64) -> ShapeStyle {
-        ShapeStyle {
-            color: self.colour().to_rgba(),
-            filled: false,
-            stroke_width: units(pixels).unsigned_abs(),
-        }
+        ShapeStyle { color: self.colour().to_rgba(), filled: false, stroke_width: units(pixels).unsigned_abs() }
     }
 
     pub(super) fn fill(self) -> ShapeStyle {
@@ -92,27 +88,15 @@ pub(super) fn panel(
     let scale = UNITS_PER_PIXEL.unsigned_abs();
     let mut svg = String::new();
     {
-        let area =
-            SVGBackend::with_string(&mut svg, (width * scale, height * scale)).into_drawing_area();
-        paint(&area)
-            .and_then(|()| area.present())
-            .with_context(|| format!("the plot '{title}' cannot be drawn"))?;
+        let area = SVGBackend::with_string(&mut svg, (width * scale, height * scale)).into_drawing_area();
+        paint(&area).and_then(|()| area.present()).with_context(|| format!("the plot '{title}' cannot be drawn"))?;
     }
     for (ink, variable) in Ink::ALL {
         let RGBColor(red, green, blue) = ink.colour();
-        svg = svg.replace(
-            &format!("\"#{red:02X}{green:02X}{blue:02X}\""),
-            &format!("\"var(--{variable})\""),
-        );
+        svg = svg.replace(&format!("\"#{red:02X}{green:02X}{blue:02X}\""), &format!("\"var(--{variable})\""));
     }
-    let svg = svg
-        .replace(" opacity=\"1\"", "")
-        .replace(" font-family=\"sans-serif\"", "");
-    let body = svg
-        .split_once('>')
-        .map_or("", |(_, rest)| rest)
-        .trim_end()
-        .trim_end_matches("</svg>");
+    let svg = svg.replace(" opacity=\"1\"", "").replace(" font-family=\"sans-serif\"", "");
+    let body = svg.split_once('>').map_or("", |(_, rest)| rest).trim_end().trim_end_matches("</svg>");
     Ok(html! {
         svg viewBox=(format!("0 0 {} {}", width * scale, height * scale)) style=(format!("max-width:{width}px"))
             role="img" xmlns="http://www.w3.org/2000/svg" {
@@ -130,26 +114,13 @@ mod tests {
     #[test]
     fn titles_are_escaped_and_colours_are_the_pages() {
         let drawn = panel((40, 20), "<b>&", "d", |area| {
-            area.draw(&PathElement::new(
-                vec![(0, 0), (9, 9)],
-                Ink::Baseline.line(1.5),
-            ))?;
-            area.draw(&Text::new(
-                "<i>",
-                (3, 3),
-                Ink::Text.text(HPos::Left, VPos::Center),
-            ))
+            area.draw(&PathElement::new(vec![(0, 0), (9, 9)], Ink::Baseline.line(1.5)))?;
+            area.draw(&Text::new("<i>", (3, 3), Ink::Text.text(HPos::Left, VPos::Center)))
         })
         .unwrap()
         .into_string();
-        assert!(
-            drawn.contains("&lt;b&gt;&amp;") && drawn.contains("&lt;i&gt;"),
-            "{drawn}"
-        );
-        assert!(
-            drawn.contains("stroke=\"var(--baseline)\"") && !drawn.contains("\"#"),
-            "{drawn}"
-        );
+        assert!(drawn.contains("&lt;b&gt;&amp;") && drawn.contains("&lt;i&gt;"), "{drawn}");
+        assert!(drawn.contains("stroke=\"var(--baseline)\"") && !drawn.contains("\"#"), "{drawn}");
         roxmltree::Document::parse(&drawn).unwrap();
     }
 }

@@ -6,13 +6,10 @@ pub(super) type Point = (f64, f64);
 
 /// The smallest interval that holds all finite values, or `None` without one.
 pub(super) fn span(values: impl IntoIterator<Item = f64>) -> Option<Range<f64>> {
-    values
-        .into_iter()
-        .filter(|value| value.is_finite())
-        .fold(None, |span, value| match span {
-            None => Some(value..value),
-            Some(Range { start, end }) => Some(start.min(value)..end.max(value)),
-        })
+    values.into_iter().filter(|value| value.is_finite()).fold(None, |span, value| match span {
+        None => Some(value..value),
+        Some(Range { start, end }) => Some(start.min(value)..end.max(value)),
+    })
 }
 
 /// Widens an interval by a share of its length at either end, and to at least `least`.
@@ -39,12 +36,7 @@ fn thinned(points: &[Point], tolerance: (f64, f64)) -> Vec<Point> {
     let mut open = vec![(0, points.len() - 1)];
     while let Some((first, last)) = open.pop() {
         let farthest = (first + 1..last)
-            .map(|i| {
-                (
-                    distance(points[i], points[first], points[last], tolerance),
-                    i,
-                )
-            })
+            .map(|i| (distance(points[i], points[first], points[last], tolerance), i))
             .max_by(|a, b| a.0.total_cmp(&b.0));
         if let Some((distance, middle)) = farthest
             && distance > 1.0
@@ -54,11 +46,7 @@ fn thinned(points: &[Point], tolerance: (f64, f64)) -> Vec<Point> {
             open.push((middle, last));
         }
     }
-    points
-        .iter()
-        .zip(kept)
-        .filter_map(|(point, keep)| keep.then_some(*point))
-        .collect()
+    points.iter().zip(kept).filter_map(|(point, keep)| keep.then_some(*point)).collect()
 }
 
 /// Distance of `point` from the stretch `start`-`end`, in tolerances.
@@ -66,11 +54,7 @@ fn distance(point: Point, start: Point, end: Point, tolerance: (f64, f64)) -> f6
     let scaled = |p: Point| ((p.0 - start.0) / tolerance.0, (p.1 - start.1) / tolerance.1);
     let ((px, py), (ex, ey)) = (scaled(point), scaled(end));
     let length_squared = ex * ex + ey * ey;
-    let along = if length_squared > 0.0 {
-        ((px * ex + py * ey) / length_squared).clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
+    let along = if length_squared > 0.0 { ((px * ex + py * ey) / length_squared).clamp(0.0, 1.0) } else { 0.0 };
     (px - along * ex).hypot(py - along * ey)
 }
 
@@ -83,27 +67,12 @@ mod tests {
         let mut points: Vec<Point> = (0..=100).map(|i| (f64::from(i), 0.0)).collect();
         points[50].1 = 5.0;
         let lines = polylines(&points, (0.1, 0.1));
-        assert_eq!(
-            lines,
-            [vec![
-                (0.0, 0.0),
-                (49.0, 0.0),
-                (50.0, 5.0),
-                (51.0, 0.0),
-                (100.0, 0.0)
-            ]]
-        );
+        assert_eq!(lines, [vec![(0.0, 0.0), (49.0, 0.0), (50.0, 5.0), (51.0, 0.0), (100.0, 0.0)]]);
     }
 
     #[test]
     fn a_number_that_is_not_finite_is_a_gap() {
-        let points = [
-            (0.0, 0.0),
-            (1.0, 1.0),
-            (2.0, f64::NAN),
-            (3.0, 1.0),
-            (4.0, 0.0),
-        ];
+        let points = [(0.0, 0.0), (1.0, 1.0), (2.0, f64::NAN), (3.0, 1.0), (4.0, 0.0)];
         assert_eq!(polylines(&points, (1e-3, 1e-3)).len(), 2);
         assert_eq!(span([f64::NAN, 2.0, -1.0, f64::INFINITY]), Some(-1.0..2.0));
         assert_eq!(span([f64::NAN]), None);

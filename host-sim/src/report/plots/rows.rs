@@ -27,10 +27,7 @@ impl Rows {
     }
 
     pub(super) fn size(&self) -> (u32, u32) {
-        (
-            WIDTH,
-            (TOP + BOTTOM + LINE * self.count as f64).round() as u32,
-        )
+        (WIDTH, (TOP + BOTTOM + LINE * self.count as f64).round() as u32)
     }
 
     /// Horizontal place of a value, in drawing units; values outside are put on the edge.
@@ -50,47 +47,22 @@ impl Rows {
         let bottom = units(TOP + LINE * self.count as f64);
         for (value, label) in ticks {
             let x = self.x(*value);
-            area.draw(&PathElement::new(
-                vec![(x, units(TOP)), (x, bottom)],
-                Ink::Grid.line(1.0),
-            ))?;
+            area.draw(&PathElement::new(vec![(x, units(TOP)), (x, bottom)], Ink::Grid.line(1.0)))?;
             let place = (x, bottom + units(5.0));
-            area.draw(&Text::new(
-                label.clone(),
-                place,
-                Ink::Muted.text(HPos::Center, VPos::Top),
-            ))?;
+            area.draw(&Text::new(label.clone(), place, Ink::Muted.text(HPos::Center, VPos::Top)))?;
         }
         let middle = (self.x(self.span.start) + self.x(self.span.end)) / 2;
         let place = (middle, bottom + units(22.0));
-        area.draw(&Text::new(
-            name.to_owned(),
-            place,
-            Ink::Muted.text(HPos::Center, VPos::Top),
-        ))
+        area.draw(&Text::new(name.to_owned(), place, Ink::Muted.text(HPos::Center, VPos::Top)))
     }
 
     /// The method's name at the left of its line and a figure at the right.
-    pub(super) fn names(
-        &self,
-        area: &Area<'_>,
-        line: usize,
-        method: Method,
-        figure: &str,
-    ) -> Drawn {
+    pub(super) fn names(&self, area: &Area<'_>, line: usize, method: Method, figure: &str) -> Drawn {
         let y = self.y(line, 0.0);
         let name = (units(LABELS - 10.0), y);
-        area.draw(&Text::new(
-            method.label(),
-            name,
-            Ink::Text.text(HPos::Right, VPos::Center),
-        ))?;
+        area.draw(&Text::new(method.label(), name, Ink::Text.text(HPos::Right, VPos::Center)))?;
         let place = (units(f64::from(WIDTH) - 2.0), y);
-        area.draw(&Text::new(
-            figure.to_owned(),
-            place,
-            Ink::Muted.text(HPos::Right, VPos::Center),
-        ))
+        area.draw(&Text::new(figure.to_owned(), place, Ink::Muted.text(HPos::Right, VPos::Center)))
     }
 }
 

@@ -10,12 +10,7 @@ use maud::Markup;
 use plotters::prelude::*;
 
 const SIZE: (u32, u32) = (340, 230);
-const SHOWN: [Method; 4] = [
-    Method::FeedforwardFeedback,
-    Method::Ridge,
-    Method::NetInt8,
-    Method::FullInt8,
-];
+const SHOWN: [Method; 4] = [Method::FeedforwardFeedback, Method::Ridge, Method::NetInt8, Method::FullInt8];
 
 /// The methods that this plot shows, for its legend.
 pub(in crate::report) const fn methods_by_speed() -> [Method; 4] {
@@ -35,39 +30,23 @@ pub(in crate::report) fn reduction_by_speed(cases: &[&Case<'_>]) -> anyhow::Resu
         })
         .collect();
     let all = || lines.iter().flat_map(|(_, points)| points);
-    let (Some(first), Some(speed), Some(value)) = (
-        cases.first(),
-        span(all().map(|point| point.0)),
-        span(all().map(|point| point.1)),
-    ) else {
+    let (Some(first), Some(speed), Some(value)) =
+        (cases.first(), span(all().map(|point| point.0)), span(all().map(|point| point.1)))
+    else {
         return Ok(None);
     };
     if speed.end <= speed.start {
         return Ok(None);
     }
-    let title = format!(
-        "Mean error reduction by speed, {} {}, {}",
-        first.vehicle, first.gains, first.condition
-    );
-    let description =
-        "Mean reduction of the error in per cent against the factor on the drawn speed.";
+    let title = format!("Mean error reduction by speed, {} {}, {}", first.vehicle, first.gains, first.condition);
+    let description = "Mean reduction of the error in per cent against the factor on the drawn speed.";
     panel(SIZE, &title, description, |area| {
-        let labels = Labels {
-            x: "speed factor",
-            y: "mean reduction [%]",
-        };
+        let labels = Labels { x: "speed factor", y: "mean reduction [%]" };
         let floor = widened(&value, 0.05, 5.0).start;
-        let mut chart = axes(
-            area,
-            widened(&speed, 0.06, 0.1),
-            floor..100.0_f64.max(value.end),
-            &labels,
-        )?;
+        let mut chart = axes(area, widened(&speed, 0.06, 0.1), floor..100.0_f64.max(value.end), &labels)?;
         for (method, points) in &lines {
             curve(&mut chart, points, ink(*method).line(1.8))?;
-            let dots = points
-                .iter()
-                .map(|point| Circle::new(*point, units(3.2), ink(*method).fill()));
+            let dots = points.iter().map(|point| Circle::new(*point, units(3.2), ink(*method).fill()));
             chart.draw_series(dots)?;
         }
         Ok(())
