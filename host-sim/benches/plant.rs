@@ -58,12 +58,13 @@ fn peng_quad(criterion: &mut Criterion) {
         .collect();
     let inertia = <[f32; 9]>::try_from(inertia).expect("nine entries");
     let (mass, gravity) = (vehicle.mass as f32, GRAVITY as f32);
-    let start = peng_quad::Quadrotor::new(STEP as f32, mass, gravity, 0.001, inertia)
+    let mut quadrotor = peng_quad::Quadrotor::new(STEP as f32, mass, gravity, 0.001, inertia)
         .expect("an invertible inertia");
+    let start = quadrotor.get_state();
     let torque = Default::default();
     group.bench_function("Runge-Kutta step of 1 flight, f32", |bencher| {
         bencher.iter(|| {
-            let mut quadrotor = start.clone();
+            quadrotor.set_state(&start);
             for _ in 0..RESTART {
                 quadrotor.update_dynamics_with_controls_rk4(black_box(mass * gravity), &torque);
             }
