@@ -13,4 +13,6 @@ pub mod rollout;
 pub mod sensors;
 pub mod training;
 pub mod trajectory;
+pub mod plant;
+pub mod sensors;
 pub mod weather;
