@@ -1,1 +1,3 @@
 //! Model export.
+
+pub mod float_network;
