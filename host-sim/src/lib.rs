@@ -3,3 +3,4 @@
 //!
 //! SI units; world frame ENU (z up), body frame FLU, Hamilton quaternion body to world; f64 here, f32 in the firmware.
 
+pub mod training;
