@@ -18,7 +18,7 @@ impl RowMatrix {
 
     /// Rows one after another; `None` unless the values fill whole rows.
     pub fn from_values(columns: usize, values: Vec<f32>) -> Option<Self> {
-        (columns > 0 && values.len() % columns == 0).then_some(Self { columns, values })
+        (columns > 0 && values.len().is_multiple_of(columns)).then_some(Self { columns, values })
     }
 
     /// Adds one row.

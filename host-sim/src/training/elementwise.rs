@@ -1,5 +1,6 @@
 //! The parts of a training step that work number by number. Plain loops: inside `pulp`'s dispatch the compiler turns them
-//! into vector code. None of them adds up in an order that depends on the machine.
+//! into vector code. (Each closure moves what it writes to into itself: a closure that could be called twice is called through
+//! a shim, which is not inlined and would lose the vector instructions.) None of them adds up in an order that depends on the machine.
 
 use super::padded_matrix::{LANES, PaddedMatrix};
 use pulp::Arch;
@@ -49,6 +50,7 @@ pub(super) fn apply_tanh(arch: Arch, matrix: &mut PaddedMatrix, rows: usize) {
     arch.dispatch(
         #[inline(always)]
         || {
+            let matrix = matrix;
             for row in 0..rows {
                 for value in matrix.wide_row_mut(row) {
                     *value = tanh(*value);
@@ -64,6 +66,7 @@ pub(super) fn column_sums(arch: Arch, matrix: &PaddedMatrix, rows: usize, sums: 
     arch.dispatch(
         #[inline(always)]
         || {
+            let sums = sums;
             for first in (0..width).step_by(LANES) {
                 let mut totals = [0.0f32; LANES];
                 for row in matrix.values.chunks_exact(stride).take(rows) {
@@ -137,6 +140,7 @@ pub(super) fn adam(
     arch.dispatch(
         #[inline(always)]
         || {
+            let (values, first, second) = (values, first, second);
             let moments = first.iter_mut().zip(second.iter_mut());
             for ((value, gradient), (first, second)) in values.iter_mut().zip(gradient).zip(moments)
             {

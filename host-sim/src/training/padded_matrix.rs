@@ -78,15 +78,25 @@ impl PaddedMatrix {
         self.row_mut(row).copy_from_slice(from.row(from_row));
     }
 
-    /// Writes the transpose of `from`, block by block so that both sides stay in the cache.
+    /// Writes the transpose of `from`, whole cache lines of the result at a time.
     pub(super) fn copy_transposed(&mut self, from: &Self) {
-        for block in (0..from.rows).step_by(LANES) {
-            let rows = LANES.min(from.rows - block);
-            for column in 0..from.columns {
-                let out = &mut self.values[column * self.stride + block..][..rows];
-                let source = from.values[block * from.stride..].chunks(from.stride);
-                for (slot, row) in out.iter_mut().zip(source) {
-                    *slot = row[column];
+        for first in (0..from.rows).step_by(LANES) {
+            let block = &from.values[first * from.stride..];
+            if let Some(block) = block.get(..LANES * from.stride) {
+                let mut rows = block.chunks_exact(from.stride);
+                let rows: [&[f32]; LANES] = std::array::from_fn(|_| {
+                    &rows.next().expect("the block has that many rows")[..from.columns]
+                });
+                let lines = self.values.chunks_exact_mut(self.stride);
+                for (column, line) in lines.enumerate().take(from.columns) {
+                    let line = line[first..].first_chunk_mut().expect("rows are padded");
+                    *line = rows.map(|row| row[column]);
+                }
+            } else {
+                for (row, source) in block.chunks_exact(from.stride).enumerate() {
+                    for (column, value) in source[..from.columns].iter().enumerate() {
+                        self.values[column * self.stride + first + row] = *value;
+                    }
                 }
             }
         }

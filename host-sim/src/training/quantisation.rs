@@ -62,6 +62,8 @@ pub(super) fn round_weights(
     arch.dispatch(
         #[inline(always)]
         || {
+            // Moved in for the reason given in `elementwise`.
+            let (to, scales) = (to, scales);
             let scales = &mut scales[..width];
             scales.fill(0.0);
             for row in from.values.chunks_exact(stride) {
@@ -99,6 +101,8 @@ pub(super) fn round_activations(
     arch.dispatch(
         #[inline(always)]
         || {
+            // Moved in for the reason given in `elementwise`.
+            let matrix = matrix;
             for row in 0..rows {
                 for value in matrix.wide_row_mut(row) {
                     *value = round_to(*value, scale, limit);

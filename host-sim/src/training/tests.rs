@@ -202,9 +202,10 @@ fn outliers_pull_less_with_huber_and_without_weight_not_at_all() {
     let clean = toy(600, 1, 0.0);
     let mut labels = RowMatrix::new(3);
     let mut weights = vec![1.0; 600];
-    for row in 0..600 {
-        let outlier = if row % 10 == 0 { 8.0 } else { 0.0 };
-        weights[row] = if row % 10 == 0 { 0.0 } else { 1.0 };
+    for (row, weight) in weights.iter_mut().enumerate() {
+        let is_outlier = row % 10 == 0;
+        let outlier = if is_outlier { 8.0 } else { 0.0 };
+        *weight = if is_outlier { 0.0 } else { 1.0 };
         let label = clean.labels().row(row);
         labels.push(&[label[0] + outlier, label[1], label[2] + outlier]);
     }
