@@ -157,9 +157,10 @@ impl Backpropagation {
             }
             // Nobody asks for the gradient of the network's inputs.
             if index > 0 {
-                layer
-                    .transposed
-                    .copy_transposed(layer.used.as_ref().unwrap_or(&layer.weights.value));
+                layer.transposed.copy_transposed(
+                    self.arch,
+                    layer.used.as_ref().unwrap_or(&layer.weights.value),
+                );
             }
         }
     }

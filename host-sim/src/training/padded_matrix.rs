@@ -1,5 +1,7 @@
 //! Row-major f32 matrices whose rows are padded to whole vectors.
 
+use pulp::{Arch, Simd, WithSimd};
+
 /// Rows are padded to a multiple of this many numbers: one AVX-512 register, one cache line.
 pub const LANES: usize = 16;
 
@@ -78,25 +80,58 @@ impl PaddedMatrix {
         self.row_mut(row).copy_from_slice(from.row(from_row));
     }
 
-    /// Writes the transpose of `from`, whole cache lines of the result at a time.
-    pub(super) fn copy_transposed(&mut self, from: &Self) {
-        for first in (0..from.rows).step_by(LANES) {
-            let block = &from.values[first * from.stride..];
-            if let Some(block) = block.get(..LANES * from.stride) {
-                let mut rows = block.chunks_exact(from.stride);
-                let rows: [&[f32]; LANES] = std::array::from_fn(|_| {
-                    &rows.next().expect("the block has that many rows")[..from.columns]
-                });
-                let lines = self.values.chunks_exact_mut(self.stride);
-                for (column, line) in lines.enumerate().take(from.columns) {
-                    let line = line[first..].first_chunk_mut().expect("rows are padded");
-                    *line = rows.map(|row| row[column]);
+    /// Writes the transpose of `from`, in blocks of 16 × 16 that are transposed in registers.
+    pub(super) fn copy_transposed(&mut self, arch: Arch, from: &Self) {
+        arch.dispatch(Transposition { from, to: self });
+    }
+}
+
+struct Transposition<'a> {
+    from: &'a PaddedMatrix,
+    to: &'a mut PaddedMatrix,
+}
+
+impl WithSimd for Transposition<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { from, to } = self;
+        for first_row in (0..from.rows).step_by(LANES) {
+            for first_column in (0..from.columns).step_by(LANES) {
+                let mut block = [[0.0; LANES]; LANES];
+                let source = from.values[first_row * from.stride..].chunks_exact(from.stride);
+                for (line, row) in block.iter_mut().zip(source) {
+                    line.copy_from_slice(&row[first_column..][..LANES]);
                 }
-            } else {
-                for (row, source) in block.chunks_exact(from.stride).enumerate() {
-                    for (column, value) in source[..from.columns].iter().enumerate() {
-                        self.values[column * self.stride + first + row] = *value;
-                    }
+                transpose_block(&mut block);
+                let target = to.values[first_column * to.stride..].chunks_exact_mut(to.stride);
+                for (line, row) in block.iter().zip(target) {
+                    row[first_row..][..LANES].copy_from_slice(line);
+                }
+            }
+        }
+    }
+}
+
+/// Exchanges the off-diagonal quarters of blocks of 2, 4, 8 and 16 rows: shuffles of whole registers.
+#[inline(always)]
+fn transpose_block(block: &mut [[f32; LANES]; LANES]) {
+    exchange::<1>(block);
+    exchange::<2>(block);
+    exchange::<4>(block);
+    exchange::<8>(block);
+}
+
+#[inline(always)]
+fn exchange<const HALF: usize>(block: &mut [[f32; LANES]; LANES]) {
+    for row in 0..LANES {
+        if row & HALF == 0 {
+            let (upper, lower) = (block[row], block[row + HALF]);
+            for column in 0..LANES {
+                if column & HALF == 0 {
+                    block[row][column + HALF] = lower[column];
+                    block[row + HALF][column] = upper[column + HALF];
                 }
             }
         }
@@ -122,7 +157,7 @@ mod tests {
             let matrix =
                 PaddedMatrix::from_fn(rows, columns, |row, column| (row * 1000 + column) as f32);
             let mut transposed = PaddedMatrix::zeros(columns, rows);
-            transposed.copy_transposed(&matrix);
+            transposed.copy_transposed(Arch::new(), &matrix);
             let expected =
                 PaddedMatrix::from_fn(columns, rows, |row, column| (column * 1000 + row) as f32);
             assert_eq!(transposed, expected);
