@@ -5,6 +5,7 @@
 
 pub mod condition;
 pub mod examples;
+pub mod experiment;
 pub mod feedback_design;
 pub mod flight_log;
 pub mod plant;
@@ -13,6 +14,4 @@ pub mod rollout;
 pub mod sensors;
 pub mod training;
 pub mod trajectory;
-pub mod plant;
-pub mod sensors;
 pub mod weather;
