@@ -14,8 +14,11 @@ use crate::{
     types::{MotorCommand, Reference, Setpoint, State, Tick},
 };
 
-/// Samples of the desired trajectory that the flight stack keeps: 1.6 s at 100 Hz.
-pub const PREVIEW: usize = 160;
+/// Samples of the desired trajectory that the flight stack keeps: 1.92 s at 100 Hz.
+pub const PREVIEW: usize = 192;
+
+/// Commands of the position loop that can be on their way to the attitude loop: 160 ms at 100 Hz.
+const COMMANDS: usize = 16;
 
 /// Rates of the loops.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -68,6 +71,8 @@ pub struct Flight<'m> {
     wanted: ThrustVector,
     reference: Reference,
     excitation: nalgebra::Vector3<f32>,
+    command_delay: u32,
+    on_the_way: heapless::Deque<(u32, ThrustVector), COMMANDS>,
 }
 
 impl<'m> Flight<'m> {
@@ -84,6 +89,8 @@ impl<'m> Flight<'m> {
             wanted: ThrustVector { force: nalgebra::Vector3::zeros(), attitude: nalgebra::Matrix3::identity() },
             reference: Reference::default(),
             excitation: nalgebra::Vector3::zeros(),
+            command_delay: 0,
+            on_the_way: heapless::Deque::new(),
         })
     }
 
@@ -124,6 +131,12 @@ impl<'m> Flight<'m> {
         self.excitation = offset;
     }
 
+    /// Delays the position loop's command on its way to the attitude loop by this many control ticks (0 in flight): the link of
+    /// a position loop off board, or a robustness test. What does not fit into the queue is applied at once.
+    pub fn set_command_delay(&mut self, ticks: u32) {
+        self.command_delay = ticks;
+    }
+
     /// One control tick.
     pub fn step(&mut self, tick: Tick, state: &State) -> MotorCommand {
         if tick.0.is_multiple_of(self.position_divisor) {
@@ -132,7 +145,16 @@ impl<'m> Flight<'m> {
             if self.excitation != nalgebra::Vector3::zeros() {
                 self.reference.position += self.excitation;
             }
-            self.wanted = self.position.step(&self.reference, state);
+            let wanted = self.position.step(&self.reference, state);
+            if tick.0 == 0 {
+                self.wanted = wanted;
+            }
+            if let Err((_, wanted)) = self.on_the_way.push_back((tick.0.wrapping_add(self.command_delay), wanted)) {
+                self.wanted = wanted;
+            }
+        }
+        while let Some((_, wanted)) = self.on_the_way.pop_front_if(|(due, _)| *due <= tick.0) {
+            self.wanted = wanted;
         }
         let (thrust, moment) = self.attitude.step(&self.wanted, state);
         self.mixer.mix(thrust, &moment)

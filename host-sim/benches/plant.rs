@@ -7,9 +7,7 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use impromptu_host_sim::plant::{
-    Disturbance, GRAVITY, LANES, Plant, State, States, Variation, Vehicle,
-};
+use impromptu_host_sim::plant::{Disturbance, GRAVITY, LANES, Plant, State, States, Variation, Vehicle};
 
 /// Step of the simulation, s.
 const STEP: f64 = 0.002;
@@ -24,11 +22,7 @@ fn plant(criterion: &mut Criterion) {
         let vehicle = Vehicle::named(name).expect("a built-in vehicle");
         let plant = Plant::new(&vehicle, [Variation::default(); LANES]);
         let hover = (vehicle.mass * GRAVITY / (4.0 * vehicle.thrust_coefficient)).sqrt();
-        let start = States::splat(&State {
-            velocity: [1.0, 0.5, 0.2],
-            rotor_speeds: [hover; 4],
-            ..State::at_rest([0.0; 3])
-        });
+        let start = States::splat(&State { velocity: [1.0, 0.5, 0.2], rotor_speeds: [hover; 4], ..State::at_rest([0.0; 3]) });
         let commands = [1.0, 1.001, 1.0, 0.999].map(|factor| [factor * hover; LANES]);
         let mut disturbance = Disturbance::default();
         disturbance.set_lane(0, [1.0, 0.0, 0.0], [0.05, 0.0, 0.0]);
@@ -50,16 +44,10 @@ fn peng_quad(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("peng_quad");
     group.throughput(Throughput::Elements(RESTART as u64));
     let vehicle = Vehicle::named("crazyflie").expect("a built-in vehicle");
-    let inertia: Vec<f32> = vehicle
-        .inertia
-        .matrix()
-        .iter()
-        .map(|value| *value as f32)
-        .collect();
+    let inertia: Vec<f32> = vehicle.inertia.matrix().iter().map(|value| *value as f32).collect();
     let inertia = <[f32; 9]>::try_from(inertia).expect("nine entries");
     let (mass, gravity) = (vehicle.mass as f32, GRAVITY as f32);
-    let mut quadrotor = peng_quad::Quadrotor::new(STEP as f32, mass, gravity, 0.001, inertia)
-        .expect("an invertible inertia");
+    let mut quadrotor = peng_quad::Quadrotor::new(STEP as f32, mass, gravity, 0.001, inertia).expect("an invertible inertia");
     let start = quadrotor.get_state();
     let torque = Default::default();
     group.bench_function("Runge-Kutta step of 1 flight, f32", |bencher| {

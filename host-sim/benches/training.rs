@@ -30,15 +30,8 @@ fn trainer(activation: Activation) -> NetworkTrainer {
         RowMatrix::from_values(columns, values.collect()).expect("whole rows")
     };
     let data = Dataset::new(table(inputs), table(outputs)).expect("finite rows");
-    let settings = TrainingSettings {
-        hidden: WIDTHS[1..5].to_vec(),
-        activation,
-        epochs: 0,
-        ..Default::default()
-    };
-    let network = train(&settings, &data, &data, &mut |_| {})
-        .expect("usable settings")
-        .network;
+    let settings = TrainingSettings { hidden: WIDTHS[1..5].to_vec(), activation, epochs: 0, ..Default::default() };
+    let network = train(&settings, &data, &data, &mut |_| {}).expect("usable settings").network;
     NetworkTrainer::new(&network, &settings, &data).expect("usable settings")
 }
 

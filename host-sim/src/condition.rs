@@ -21,7 +21,7 @@ pub struct Condition {
     pub name: String,
     /// Age of position and velocity when the loop and the add-on receive them, s.
     pub measurement_delay_s: f64,
-    /// Delay between motor command and motor, s.
+    /// Delay of the position loop's command on its way to the attitude loop, s: the radio link of a loop off board.
     pub command_delay_s: f64,
     /// Sensor noise: position and velocity at each reference tick, attitude and rates at each control tick.
     #[serde(default)]
@@ -55,12 +55,12 @@ impl Condition {
         }
     }
 
-    /// The same with `seconds` more measurement delay, which is a delay of the whole position loop.
+    /// The same with `seconds` more delay in the whole position loop: its commands arrive later.
     #[must_use]
     pub fn delayed(&self, seconds: f64) -> Self {
         Self {
             name: format!("{}+{:.0}ms", self.name, seconds * 1e3),
-            measurement_delay_s: self.measurement_delay_s + seconds,
+            command_delay_s: self.command_delay_s + seconds,
             ..self.clone()
         }
     }

@@ -55,6 +55,11 @@ impl Signals for Flown {
     }
 }
 
+/// Corrections below this are not worth more than others, m.
+const LEAST_CORRECTION: f64 = 0.02;
+
+/// Every log counts by its relative error, as flights are judged: its rows weigh the reciprocal of its mean squared position correction.
+///
 /// Rows of features and labels (position and velocity correction, m and m/s) from `logs`.
 ///
 /// # Errors
@@ -62,6 +67,7 @@ impl Signals for Flown {
 pub fn examples(logs: &[&FlightLog], features: &[Feature], settings: &ExampleSettings) -> Result<Dataset, DatasetError> {
     let mut inputs = RowMatrix::new(features.len());
     let mut labels = RowMatrix::new(REFERENCE);
+    let mut weights = Vec::new();
     let divisor = i32::from(settings.divisor);
     let reach = features.iter().map(|feature| i32::from(feature.offset) * divisor);
     let (past, future) = (-reach.clone().min().unwrap_or(0).min(0), reach.max().unwrap_or(0).max(0));
@@ -71,6 +77,7 @@ pub fn examples(logs: &[&FlightLog], features: &[Feature], settings: &ExampleSet
         // The smoothing has no neighbours at the ends.
         let edge = (3.0 * settings.smoothing_s * log.rate_hz).ceil() as i32;
         let last = flown.output.len() as i32 - 1 - future - edge;
+        let first_row = labels.rows();
         for tick in ((past + edge)..=last).step_by(settings.stride.max(1)) {
             let now = tick as usize;
             features::evaluate(features, &flown, tick, divisor, &mut row);
@@ -78,8 +85,12 @@ pub fn examples(logs: &[&FlightLog], features: &[Feature], settings: &ExampleSet
             let label: [f32; REFERENCE] = std::array::from_fn(|i| (flown.reference[now][i] - flown.output[now][i]) as f32);
             labels.push(&label);
         }
+        let rows = labels.rows() - first_row;
+        let position = (first_row..labels.rows()).flat_map(|row| &labels.row(row)[..3]);
+        let square = position.map(|value| f64::from(value * value)).sum::<f64>() / rows.max(1) as f64;
+        weights.resize(labels.rows(), (1.0 / (square + LEAST_CORRECTION * LEAST_CORRECTION)) as f32);
     }
-    Dataset::new(inputs, labels)
+    Dataset::new(inputs, labels)?.with_row_weights(weights)
 }
 
 /// Output and reference of a log, in step with each other and smoothed.

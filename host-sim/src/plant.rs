@@ -56,12 +56,7 @@ pub struct Variation {
 
 impl Default for Variation {
     fn default() -> Self {
-        Self {
-            payload_factor: 1.0,
-            thrust_factor: 1.0,
-            drag_factor: 1.0,
-            motor_lag_factor: 1.0,
-        }
+        Self { payload_factor: 1.0, thrust_factor: 1.0, drag_factor: 1.0, motor_lag_factor: 1.0 }
     }
 }
 
@@ -109,74 +104,31 @@ impl Plant {
     /// The widest vector instructions of the processor are used; no multiplication is fused with an addition, so that
     /// the bits are the same on each.
     #[inline]
-    pub fn step(
-        &self,
-        states: &mut States,
-        commands: &[Lanes; 4],
-        disturbance: &Disturbance,
-        duration: f64,
-    ) {
+    pub fn step(&self, states: &mut States, commands: &[Lanes; 4], disturbance: &Disturbance, duration: f64) {
         self.step_with(self.arch, states, commands, disturbance, duration);
     }
 
     /// [`Plant::step`] on a given instruction set.
     #[inline]
-    fn step_with(
-        &self,
-        arch: Arch,
-        states: &mut States,
-        commands: &[Lanes; 4],
-        disturbance: &Disturbance,
-        duration: f64,
-    ) {
+    fn step_with(&self, arch: Arch, states: &mut States, commands: &[Lanes; 4], disturbance: &Disturbance, duration: f64) {
         let constants = &self.constants;
         match self.form {
-            Form::Planar => arch.dispatch(Step::<Planar<false>>::new(
-                constants,
-                states,
-                commands,
-                disturbance,
-                duration,
-            )),
-            Form::PlanarWithLift => arch.dispatch(Step::<Planar<true>>::new(
-                constants,
-                states,
-                commands,
-                disturbance,
-                duration,
-            )),
-            Form::Full => arch.dispatch(Step::<Full>::new(
-                constants,
-                states,
-                commands,
-                disturbance,
-                duration,
-            )),
+            Form::Planar => arch.dispatch(Step::<Planar<false>>::new(constants, states, commands, disturbance, duration)),
+            Form::PlanarWithLift => arch.dispatch(Step::<Planar<true>>::new(constants, states, commands, disturbance, duration)),
+            Form::Full => arch.dispatch(Step::<Full>::new(constants, states, commands, disturbance, duration)),
         }
     }
 
     /// The time derivative of every flight's state: each component per second. `commands[rotor][lane]`, rad/s.
-    pub fn derivative(
-        &self,
-        states: &States,
-        commands: &[Lanes; 4],
-        disturbance: &Disturbance,
-    ) -> States {
+    pub fn derivative(&self, states: &States, commands: &[Lanes; 4], disturbance: &Disturbance) -> States {
         match self.form {
             Form::Planar => self.derivative_of::<Planar<false>>(states, commands, disturbance),
-            Form::PlanarWithLift => {
-                self.derivative_of::<Planar<true>>(states, commands, disturbance)
-            }
+            Form::PlanarWithLift => self.derivative_of::<Planar<true>>(states, commands, disturbance),
             Form::Full => self.derivative_of::<Full>(states, commands, disturbance),
         }
     }
 
-    fn derivative_of<M: Model>(
-        &self,
-        states: &States,
-        commands: &[Lanes; 4],
-        disturbance: &Disturbance,
-    ) -> States {
+    fn derivative_of<M: Model>(&self, states: &States, commands: &[Lanes; 4], disturbance: &Disturbance) -> States {
         let mut derivative = *states;
         derivative.position = states.velocity;
         for lane in 0..LANES {
@@ -185,11 +137,7 @@ impl Plant {
             let rates = wrench::derivative::<M>(
                 &self.constants,
                 &constants,
-                &Motion {
-                    velocity: state.velocity,
-                    attitude: state.attitude,
-                    body_rates: state.body_rates,
-                },
+                &Motion { velocity: state.velocity, attitude: state.attitude, body_rates: state.body_rates },
                 &state.rotor_speeds,
                 &gather(&disturbance.wind_velocity, lane),
                 &gather(&disturbance.acceleration, lane),
@@ -213,16 +161,12 @@ impl Plant {
             let state = states.lane(lane);
             let wind = gather(&disturbance.wind_velocity, lane);
             let rotation = Rotation::new(&state.attitude);
-            let airspeed = rotation.to_body(&std::array::from_fn(|axis| {
-                state.velocity[axis] - wind[axis]
-            }));
+            let airspeed = rotation.to_body(&std::array::from_fn(|axis| state.velocity[axis] - wind[axis]));
             let (shared, own) = (&self.constants, self.constants.lane(lane));
             let (rates, speeds) = (&state.body_rates, &state.rotor_speeds);
             match self.form {
                 Form::Planar => Planar::<false>::wrench(shared, &own, &airspeed, rates, speeds),
-                Form::PlanarWithLift => {
-                    Planar::<true>::wrench(shared, &own, &airspeed, rates, speeds)
-                }
+                Form::PlanarWithLift => Planar::<true>::wrench(shared, &own, &airspeed, rates, speeds),
                 Form::Full => Full::wrench(shared, &own, &airspeed, rates, speeds),
             }
         })

@@ -179,7 +179,6 @@ struct Pilot<'a> {
     flight: Flight<'a>,
     sensors: Sensors,
     late: DelayLine<([f64; 3], [f64; 3])>,
-    commands: DelayLine<[f64; 4]>,
     dither: Option<(Dither, Xoshiro256PlusPlus)>,
     known: FirmwareState,
     squares: f64,
@@ -276,6 +275,7 @@ impl<'a> Pilot<'a> {
                 adapter.set_loop_gain(plan.loop_gain);
             }
         }
+        flight.set_command_delay(ticks(condition.command_delay_s) as u32);
         for sample in plan.trajectory.samples.iter().take(PREVIEW / 2 + PREVIEW / 4) {
             flight.push_setpoint(&setpoint(sample));
         }
@@ -283,7 +283,6 @@ impl<'a> Pilot<'a> {
             flight,
             sensors: Sensors::new(&condition.noise, plan.seed).map_err(|error| refuse(error.to_string()))?,
             late: DelayLine::new(ticks(condition.measurement_delay_s)).map_err(|error| refuse(error.to_string()))?,
-            commands: DelayLine::new(ticks(condition.command_delay_s)).map_err(|error| refuse(error.to_string()))?,
             dither: plan.dither.map(|dither| (dither, Xoshiro256PlusPlus::seed_from_u64(plan.seed ^ 0x9b05_688c_2b3e_6c1f))),
             known: FirmwareState::default(),
             squares: 0.0,
@@ -316,7 +315,7 @@ impl<'a> Pilot<'a> {
         if tick.is_multiple_of(divisor) {
             self.score(reference_tick, state);
         }
-        self.commands.push(command.fractions().map(f64::from))
+        command.fractions().map(f64::from)
     }
 
     fn dither(&mut self, reference_tick: usize) {

@@ -55,12 +55,7 @@ pub struct Measurement {
 impl From<&State> for Measurement {
     /// Without noise.
     fn from(state: &State) -> Self {
-        Self {
-            position: state.position,
-            velocity: state.velocity,
-            attitude: state.attitude,
-            body_rates: state.body_rates,
-        }
+        Self { position: state.position, velocity: state.velocity, attitude: state.attitude, body_rates: state.body_rates }
     }
 }
 
@@ -101,20 +96,12 @@ impl Sensors {
     pub fn measure(&mut self, state: &State) -> Measurement {
         let (position, velocity) = self.position_and_velocity(state);
         let (attitude, body_rates) = self.attitude_and_body_rates(state);
-        Measurement {
-            position,
-            velocity,
-            attitude,
-            body_rates,
-        }
+        Measurement { position, velocity, attitude, body_rates }
     }
 
     /// Measures position (m) and velocity (m/s), world ENU.
     pub fn position_and_velocity(&mut self, state: &State) -> ([f64; 3], [f64; 3]) {
-        (
-            noisy(state.position, self.noise.position, &mut self.slow),
-            noisy(state.velocity, self.noise.velocity, &mut self.slow),
-        )
+        (noisy(state.position, self.noise.position, &mut self.slow), noisy(state.velocity, self.noise.velocity, &mut self.slow))
     }
 
     /// Measures attitude (unit quaternion w, x, y, z, body to world) and body rates (rad/s).
@@ -154,12 +141,7 @@ fn noisy(value: [f64; 3], sigma: f64, random: &mut Xoshiro256PlusPlus) -> [f64; 
 mod tests {
     use super::*;
 
-    const LAB: SensorNoise = SensorNoise {
-        position: 0.3e-3,
-        velocity: 0.01,
-        attitude: 2e-3,
-        body_rates: 0.02,
-    };
+    const LAB: SensorNoise = SensorNoise { position: 0.3e-3, velocity: 0.01, attitude: 2e-3, body_rates: 0.02 };
 
     fn state() -> State {
         State {
@@ -217,10 +199,7 @@ mod tests {
 
     #[test]
     fn impossible_noise_is_refused_by_name() {
-        let noise = SensorNoise {
-            attitude: -1.0,
-            ..LAB
-        };
+        let noise = SensorNoise { attitude: -1.0, ..LAB };
         assert_eq!(Sensors::new(&noise, 0).unwrap_err().field, "attitude");
         assert!(toml::from_str::<SensorNoise>("gyro = 1.0").is_err());
     }

@@ -25,9 +25,7 @@ pub use ridge::{Ridge, RidgeError};
 pub use settings::{FakeQuantisation, Loss, Schedule, SettingsError, Skip, TrainingSettings};
 pub use trainer::NetworkTrainer;
 
-use impromptu_model_export::float_network::{
-    Activation, DenseLayer, FloatNetwork, FloatNetworkError,
-};
+use impromptu_model_export::float_network::{Activation, DenseLayer, FloatNetwork, FloatNetworkError};
 use rand::SeedableRng;
 use rand_distr::{Distribution, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -46,9 +44,7 @@ pub enum TrainingError {
     #[error(transparent)]
     Network(#[from] FloatNetworkError),
     /// The network to start from has no linear last layer.
-    #[error(
-        "the network to train has no layers or a last layer that is not linear; only linear outputs can be trained"
-    )]
+    #[error("the network to train has no layers or a last layer that is not linear; only linear outputs can be trained")]
     LastLayer,
     /// Data of another width.
     #[error("the data has {found} {what}; the network has {expected}")]
@@ -126,8 +122,7 @@ pub fn fine_tune(
     let mut trainer = NetworkTrainer::new(network, settings, training)?;
     trainer::check_columns(network, validation)?;
     let validation = trainer.standardise(validation);
-    let (mut history, mut best, mut kept): (Vec<Progress>, usize, Vec<_>) =
-        (Vec::new(), 0, Vec::new());
+    let (mut history, mut best, mut kept): (Vec<Progress>, usize, Vec<_>) = (Vec::new(), 0, Vec::new());
     for epoch in 0..=settings.epochs {
         let trained = (epoch > 0).then(|| trainer.epoch());
         let validation_loss = trainer.loss_of(&validation);
@@ -135,51 +130,27 @@ pub fn fine_tune(
         if !(training_loss.is_finite() && validation_loss.is_finite()) {
             return Err(TrainingError::Diverged { epoch });
         }
-        let record = Progress {
-            epoch,
-            of: settings.epochs,
-            training_loss,
-            validation_loss,
-        };
+        let record = Progress { epoch, of: settings.epochs, training_loss, validation_loss };
         progress(record);
         history.push(record);
         if epoch == 0 || validation_loss < history[best].validation_loss {
             best = epoch;
             trainer.store_values(&mut kept);
         }
-        if settings
-            .patience
-            .is_some_and(|patience| epoch - best >= patience.max(1))
-        {
+        if settings.patience.is_some_and(|patience| epoch - best >= patience.max(1)) {
             break;
         }
     }
     trainer.restore_values(kept);
-    Ok(Training {
-        network: trainer.network(),
-        history,
-        best,
-    })
+    Ok(Training { network: trainer.network(), history, best })
 }
 
 /// Uniform weights, for ReLU of variance 2 / inputs (He et al., ICCV 2015), else 2 / (inputs + outputs) (Glorot and Bengio,
 /// AISTATS 2010); biases zero.
-fn initial_layers(
-    inputs: usize,
-    outputs: usize,
-    settings: &TrainingSettings,
-    gain: f32,
-) -> Vec<DenseLayer> {
+fn initial_layers(inputs: usize, outputs: usize, settings: &TrainingSettings, gain: f32) -> Vec<DenseLayer> {
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(settings.seed);
-    let hidden = settings
-        .hidden
-        .iter()
-        .map(|width| (*width, settings.activation, 1.0));
-    let last = (
-        outputs,
-        Activation::Linear,
-        settings.initial_output_gain / gain,
-    );
+    let hidden = settings.hidden.iter().map(|width| (*width, settings.activation, 1.0));
+    let last = (outputs, Activation::Linear, settings.initial_output_gain / gain);
     let mut width = inputs;
     hidden
         .chain(std::iter::once(last))
@@ -189,17 +160,10 @@ fn initial_layers(
                 Activation::Tanh | Activation::Linear => 2.0 / (width + outputs) as f32,
             };
             let limit = (3.0 * variance).sqrt();
-            let uniform =
-                Uniform::new_inclusive(-limit, limit).expect("the limit is positive and finite");
-            let weights = (0..width * outputs)
-                .map(|_| factor * uniform.sample(&mut generator))
-                .collect();
+            let uniform = Uniform::new_inclusive(-limit, limit).expect("the limit is positive and finite");
+            let weights = (0..width * outputs).map(|_| factor * uniform.sample(&mut generator)).collect();
             width = outputs;
-            DenseLayer {
-                weights,
-                bias: vec![0.0; outputs],
-                activation,
-            }
+            DenseLayer { weights, bias: vec![0.0; outputs], activation }
         })
         .collect()
 }

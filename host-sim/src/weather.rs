@@ -71,11 +71,7 @@ impl Weather {
     ///
     /// # Errors
     /// A setting that is not finite or out of its range.
-    pub fn new(
-        settings: &WeatherSettings,
-        tick: f64,
-        seeds: [u64; LANES],
-    ) -> Result<Self, WeatherError> {
+    pub fn new(settings: &WeatherSettings, tick: f64, seeds: [u64; LANES]) -> Result<Self, WeatherError> {
         require(tick.is_finite() && tick > 0.0, "tick", "positive (s)")?;
         let finite = settings.mean_wind.iter().all(|value| value.is_finite());
         require(finite, "mean_wind", "finite (m/s)")?;
@@ -87,11 +83,7 @@ impl Weather {
         // A stream of its own for each source, so that switching one on leaves the others' bits alone.
         let stream = |seed: u64, salt: u64| Xoshiro256PlusPlus::seed_from_u64(seed ^ salt);
         let lanes = seeds.map(|seed| Sources {
-            acceleration: Process::new(
-                &settings.acceleration,
-                tick,
-                stream(seed, 0x61c8_8646_80b5_83eb),
-            ),
+            acceleration: Process::new(&settings.acceleration, tick, stream(seed, 0x61c8_8646_80b5_83eb)),
             wind: Process::new(&settings.wind, tick, stream(seed, 0x3c6e_f372_fe94_f82b)),
             gusts: settings.gusts.as_ref().map(|gusts| {
                 let stream = stream(seed, 0xa54f_f53a_5f1d_36f1);
@@ -100,9 +92,7 @@ impl Weather {
         });
         let mut weather = Self {
             mean_wind: settings.mean_wind,
-            changes: !settings.acceleration.is_still()
-                || !settings.wind.is_still()
-                || settings.gusts.is_some(),
+            changes: !settings.acceleration.is_still() || !settings.wind.is_still() || settings.gusts.is_some(),
             lanes,
             disturbance: Disturbance::default(),
         };
@@ -135,8 +125,7 @@ impl Weather {
             let random = sources.wind.value();
             let gust = sources.gusts.as_ref().map_or([0.0; 3], Gusts::value);
             let wind = std::array::from_fn(|axis| self.mean_wind[axis] + random[axis] + gust[axis]);
-            self.disturbance
-                .set_lane(lane, wind, sources.acceleration.value());
+            self.disturbance.set_lane(lane, wind, sources.acceleration.value());
         }
     }
 }
@@ -149,20 +138,10 @@ mod tests {
 
     fn stormy() -> WeatherSettings {
         WeatherSettings {
-            acceleration: OrnsteinUhlenbeck {
-                sigma: [0.12; 3],
-                correlation_time: 0.4,
-            },
+            acceleration: OrnsteinUhlenbeck { sigma: [0.12; 3], correlation_time: 0.4 },
             mean_wind: [1.0, -2.0, 0.0],
-            wind: OrnsteinUhlenbeck {
-                sigma: [0.5, 0.5, 0.2],
-                correlation_time: 2.0,
-            },
-            gusts: Some(Dryden {
-                wind_at_6_m: 4.0,
-                altitude: 5.0,
-                airspeed: 3.0,
-            }),
+            wind: OrnsteinUhlenbeck { sigma: [0.5, 0.5, 0.2], correlation_time: 2.0 },
+            gusts: Some(Dryden { wind_at_6_m: 4.0, altitude: 5.0, airspeed: 3.0 }),
         }
     }
 
@@ -185,10 +164,7 @@ mod tests {
 
     #[test]
     fn switching_a_source_on_leaves_the_others_bits_alone() {
-        let calm_air = WeatherSettings {
-            acceleration: stormy().acceleration,
-            ..WeatherSettings::default()
-        };
+        let calm_air = WeatherSettings { acceleration: stormy().acceleration, ..WeatherSettings::default() };
         let mut alone = Weather::new(&calm_air, 0.01, SEEDS).unwrap();
         let mut together = Weather::new(&stormy(), 0.01, SEEDS).unwrap();
         for _ in 0..100 {
@@ -208,10 +184,7 @@ mod tests {
         assert_eq!(with(|s| s.acceleration.sigma[1] = -1.0), "acceleration");
         assert_eq!(with(|s| s.wind.correlation_time = 0.0), "wind");
         assert_eq!(with(|s| s.mean_wind[2] = f64::NAN), "mean_wind");
-        assert_eq!(
-            with(|s| s.gusts.as_mut().unwrap().altitude = 500.0),
-            "gusts.altitude"
-        );
+        assert_eq!(with(|s| s.gusts.as_mut().unwrap().altitude = 500.0), "gusts.altitude");
         assert!(Weather::new(&stormy(), 0.0, SEEDS).is_err());
         assert!(toml::from_str::<WeatherSettings>("mean_wnd = [0.0, 0.0, 0.0]").is_err());
     }

@@ -41,9 +41,7 @@ impl Activation {
 
     /// The activation of that name, if there is one.
     pub fn from_name(name: &str) -> Option<Self> {
-        [Self::Relu, Self::Tanh, Self::Linear]
-            .into_iter()
-            .find(|activation| activation.name() == name)
+        [Self::Relu, Self::Tanh, Self::Linear].into_iter().find(|activation| activation.name() == name)
     }
 
     /// The activation of one number. tanh is libm's, so that all machines agree.
@@ -120,9 +118,7 @@ pub enum FloatNetworkError {
         reason: String,
     },
     /// A NaN or an infinity.
-    #[error(
-        "tensor `{tensor}` is not finite at index {index}; training diverged or the file is damaged"
-    )]
+    #[error("tensor `{tensor}` is not finite at index {index}; training diverged or the file is damaged")]
     NotFinite {
         /// The tensor's name in files.
         tensor: String,
@@ -138,9 +134,7 @@ pub enum FloatNetworkError {
         index: usize,
     },
     /// Nothing leads from the inputs to the outputs.
-    #[error(
-        "the network has {what}; it needs at least one input, one output, and a layer or a skip"
-    )]
+    #[error("the network has {what}; it needs at least one input, one output, and a layer or a skip")]
     Empty {
         /// What is missing.
         what: &'static str,
@@ -184,11 +178,7 @@ impl FloatNetwork {
         if let Some(skip) = &self.skip {
             output = matrix_times_vector(skip, &normalised, output);
         }
-        output
-            .iter()
-            .zip(self.output_mean.iter().zip(&self.output_scale))
-            .map(|(y, (mean, scale))| mean + scale * y)
-            .collect()
+        output.iter().zip(self.output_mean.iter().zip(&self.output_scale)).map(|(y, (mean, scale))| mean + scale * y).collect()
     }
 
     /// Whether all parts fit together: shapes chain, numbers are finite, scales positive.
@@ -197,61 +187,31 @@ impl FloatNetwork {
         for (missing, what) in [
             (inputs == 0, "no inputs"),
             (outputs == 0, "no outputs"),
-            (
-                self.layers.is_empty() && self.skip.is_none(),
-                "neither layers nor a skip",
-            ),
+            (self.layers.is_empty() && self.skip.is_none(), "neither layers nor a skip"),
         ] {
             if missing {
                 return Err(FloatNetworkError::Empty { what });
             }
         }
-        check_length(
-            "input.scale",
-            &self.input_scale,
-            inputs,
-            "as long as `input.mean`",
-        )?;
-        check_length(
-            "output.scale",
-            &self.output_scale,
-            outputs,
-            "as long as `output.mean`",
-        )?;
+        check_length("input.scale", &self.input_scale, inputs, "as long as `input.mean`")?;
+        check_length("output.scale", &self.output_scale, outputs, "as long as `output.mean`")?;
         let mut width = inputs;
         for (index, layer) in self.layers.iter().enumerate() {
             let (weight, bias) = (layer_weight_name(index), layer_bias_name(index));
             if layer.outputs() == 0 {
-                return Err(FloatNetworkError::Empty {
-                    what: "a layer without outputs",
-                });
+                return Err(FloatNetworkError::Empty { what: "a layer without outputs" });
             }
             if index + 1 == self.layers.len() {
-                check_length(
-                    &bias,
-                    &layer.bias,
-                    outputs,
-                    "the last layer gives the network's outputs",
-                )?;
+                check_length(&bias, &layer.bias, outputs, "the last layer gives the network's outputs")?;
             }
             let expected = width.saturating_mul(layer.outputs());
-            check_length(
-                &weight,
-                &layer.weights,
-                expected,
-                "outputs of this layer times those of the one before",
-            )?;
+            check_length(&weight, &layer.weights, expected, "outputs of this layer times those of the one before")?;
             check_finite(&weight, &layer.weights)?;
             check_finite(&bias, &layer.bias)?;
             width = layer.outputs();
         }
         if let Some(skip) = &self.skip {
-            check_length(
-                "skip.weight",
-                skip,
-                inputs.saturating_mul(outputs),
-                "outputs times inputs",
-            )?;
+            check_length("skip.weight", skip, inputs.saturating_mul(outputs), "outputs times inputs")?;
             check_finite("skip.weight", skip)?;
         }
         check_finite("input.mean", &self.input_mean)?;
@@ -285,29 +245,16 @@ fn matrix_times_vector(matrix: &[f32], vector: &[f32], mut start: Vec<f32>) -> V
     start
 }
 
-fn check_length(
-    tensor: &str,
-    values: &[f32],
-    expected: usize,
-    reason: &str,
-) -> Result<(), FloatNetworkError> {
+fn check_length(tensor: &str, values: &[f32], expected: usize, reason: &str) -> Result<(), FloatNetworkError> {
     if values.len() == expected {
         return Ok(());
     }
-    Err(FloatNetworkError::Shape {
-        tensor: tensor.into(),
-        found: values.len(),
-        expected,
-        reason: reason.into(),
-    })
+    Err(FloatNetworkError::Shape { tensor: tensor.into(), found: values.len(), expected, reason: reason.into() })
 }
 
 fn check_finite(tensor: &str, values: &[f32]) -> Result<(), FloatNetworkError> {
     match values.iter().position(|value| !value.is_finite()) {
-        Some(index) => Err(FloatNetworkError::NotFinite {
-            tensor: tensor.into(),
-            index,
-        }),
+        Some(index) => Err(FloatNetworkError::NotFinite { tensor: tensor.into(), index }),
         None => Ok(()),
     }
 }
@@ -315,10 +262,7 @@ fn check_finite(tensor: &str, values: &[f32]) -> Result<(), FloatNetworkError> {
 fn check_scale(tensor: &str, values: &[f32]) -> Result<(), FloatNetworkError> {
     check_finite(tensor, values)?;
     match values.iter().position(|value| *value <= 0.0) {
-        Some(index) => Err(FloatNetworkError::ScaleNotPositive {
-            tensor: tensor.into(),
-            index,
-        }),
+        Some(index) => Err(FloatNetworkError::ScaleNotPositive { tensor: tensor.into(), index }),
         None => Ok(()),
     }
 }

@@ -50,18 +50,9 @@ pub struct Output {
 impl Output {
     /// The JSON line that a successful run prints.
     pub fn report(&self) -> Result<serde_json::Value> {
-        let Self {
-            status,
-            stdout,
-            stderr,
-        } = self;
-        ensure!(
-            status.success(),
-            "the emulated board failed ({status}):\n{stdout}{stderr}"
-        );
-        serde_json::from_str(stdout).with_context(|| {
-            format!("the emulated board printed no report, but:\n{stdout}{stderr}")
-        })
+        let Self { status, stdout, stderr } = self;
+        ensure!(status.success(), "the emulated board failed ({status}):\n{stdout}{stderr}");
+        serde_json::from_str(stdout).with_context(|| format!("the emulated board printed no report, but:\n{stdout}{stderr}"))
     }
 }
 
@@ -84,11 +75,7 @@ pub fn build_firmware(bin: &str, environment: &[(&str, &str)]) -> Result<PathBuf
         .envs(environment.iter().copied())
         .output()
         .context("cannot start cargo")?;
-    ensure!(
-        built.status.success(),
-        "the firmware does not build:\n{}",
-        String::from_utf8_lossy(&built.stderr)
-    );
+    ensure!(built.status.success(), "the firmware does not build:\n{}", String::from_utf8_lossy(&built.stderr));
     let mut variant = DefaultHasher::new();
     environment.hash(&mut variant);
     let elf = folder.join(format!("{bin}-{:016x}.elf", variant.finish()));
@@ -111,10 +98,7 @@ pub fn run(elf: &Path, working_dir: &Path, timeout: Duration) -> Result<Output> 
         .spawn()
         .map_err(|error| match error.kind() {
             ErrorKind::NotFound if working_dir.is_dir() => missing_emulator(program),
-            _ => anyhow!(error).context(format!(
-                "cannot start {program} in {}",
-                working_dir.display()
-            )),
+            _ => anyhow!(error).context(format!("cannot start {program} in {}", working_dir.display())),
         })?;
     // Drained while it runs: a full pipe would stop the emulator.
     let stdout = drain(child.stdout.take());
@@ -127,17 +111,9 @@ pub fn run(elf: &Path, working_dir: &Path, timeout: Duration) -> Result<Output> 
     let stdout = stdout.join().unwrap_or_default();
     let stderr = stderr.join().unwrap_or_default();
     let Some(status) = ended else {
-        bail!(
-            "{} did not end within {} s and was stopped; it printed:\n{stdout}{stderr}",
-            elf.display(),
-            timeout.as_secs_f64()
-        );
+        bail!("{} did not end within {} s and was stopped; it printed:\n{stdout}{stderr}", elf.display(), timeout.as_secs_f64());
     };
-    Ok(Output {
-        status,
-        stdout,
-        stderr,
-    })
+    Ok(Output { status, stdout, stderr })
 }
 
 /// Reads a pipe to its end in the background.
@@ -154,20 +130,13 @@ fn drain(pipe: Option<impl Read + Send + 'static>) -> thread::JoinHandle<String>
 
 /// The error for a machine without QEMU.
 fn missing_emulator(program: &str) -> anyhow::Error {
-    let install = if cfg!(target_os = "macos") {
-        "brew install qemu"
-    } else {
-        "sudo apt-get install qemu-system-arm"
-    };
+    let install = if cfg!(target_os = "macos") { "brew install qemu" } else { "sudo apt-get install qemu-system-arm" };
     anyhow!("{program} is not installed; run: {install}")
 }
 
 /// Fails, with what to do, if the compiler has no library for [`TARGET`].
 fn require_target() -> Result<()> {
-    let asked = tool("rustc")
-        .args(["--print", "target-libdir", "--target", TARGET])
-        .output()
-        .context("cannot start rustc")?;
+    let asked = tool("rustc").args(["--print", "target-libdir", "--target", TARGET]).output().context("cannot start rustc")?;
     let folder = String::from_utf8_lossy(&asked.stdout).trim().to_owned();
     ensure!(
         asked.status.success() && Path::new(&folder).is_dir(),
@@ -204,14 +173,10 @@ fn tool(name: &str) -> Command {
 /// How cargo itself would start the emulator: the runner in `.cargo/config.toml`.
 fn runner() -> Result<Vec<String>> {
     let path = workspace().join(".cargo/config.toml");
-    let text =
-        fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
-    let config: toml::Table =
-        toml::from_str(&text).with_context(|| format!("cannot read {}", path.display()))?;
+    let text = fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
+    let config: toml::Table = toml::from_str(&text).with_context(|| format!("cannot read {}", path.display()))?;
     let runner = config["target"][TARGET]["runner"].clone();
-    runner
-        .try_into()
-        .with_context(|| format!("{}: target.{TARGET}.runner is not a list", path.display()))
+    runner.try_into().with_context(|| format!("{}: target.{TARGET}.runner is not a list", path.display()))
 }
 
 /// The folder of the workspace.

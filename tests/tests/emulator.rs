@@ -32,11 +32,7 @@ fn every_bit_equals_the_host_and_instruction_counts_repeat() {
     let rates: Vec<_> = (0..5_000u16)
         .map(|tick| {
             let time = f32::from(tick) * 0.002;
-            Vector3::new(
-                3.0 * (5.0 * time).sin(),
-                2.0 * (6.5 * time).cos(),
-                time.sin(),
-            )
+            Vector3::new(3.0 * (5.0 * time).sin(), 2.0 * (6.5 * time).cos(), time.sin())
         })
         .collect();
     let input = bytes(rates.iter().flat_map(|rate| [rate.x, rate.y, rate.z]));
@@ -82,8 +78,5 @@ fn bad_input_ends_the_board_with_a_reason() {
 fn a_board_that_does_not_end_is_stopped() {
     let elf = build_firmware("netduinoplus2", &[]).unwrap();
     let error = run(&elf, &folder("emulator-timeout"), Duration::ZERO).unwrap_err();
-    assert!(
-        error.to_string().contains("did not end within 0 s"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("did not end within 0 s"), "{error}");
 }

@@ -58,35 +58,19 @@ impl Constants {
         let position = |axis: usize| vehicle.rotors.map(|rotor| rotor.position[axis]);
         let product = |a: [f64; 4], b: [f64; 4]| std::array::from_fn(|rotor| a[rotor] * b[rotor]);
         let (x, y, z) = (position(0), position(1), position(2));
-        let (xx, xy, yy): ([f64; 4], [f64; 4], [f64; 4]) =
-            (product(x, x), product(x, y), product(y, y));
+        let (xx, xy, yy): ([f64; 4], [f64; 4], [f64; 4]) = (product(x, x), product(x, y), product(y, y));
         let distance: [f64; 4] = std::array::from_fn(|rotor| xx[rotor] + yy[rotor]);
-        let lift_moments = [
-            x,
-            y,
-            xx,
-            xy,
-            yy,
-            distance,
-            product(distance, x),
-            product(distance, y),
-        ]
-        .map(|values| vehicle.translational_lift * values.iter().sum::<f64>());
+        let lift_moments = [x, y, xx, xy, yy, distance, product(distance, x), product(distance, y)]
+            .map(|values| vehicle.translational_lift * values.iter().sum::<f64>());
         let inertia = vehicle.inertia.matrix();
         // A vehicle that passed its check has a positive definite inertia.
-        let inverse = inertia
-            .try_inverse()
-            .unwrap_or_else(nalgebra::Matrix3::zeros);
-        let rows = |matrix: &nalgebra::Matrix3<f64>| {
-            std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
-        };
+        let inverse = inertia.try_inverse().unwrap_or_else(nalgebra::Matrix3::zeros);
+        let rows =
+            |matrix: &nalgebra::Matrix3<f64>| std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]));
         let principal = [vehicle.inertia.xx, vehicle.inertia.yy, vehicle.inertia.zz];
-        let lanes = |value: f64, factor: fn(&Variation) -> f64| {
-            std::array::from_fn(|lane| value * factor(&variations[lane]))
-        };
-        let inverse_lanes = |value: f64, factor: fn(&Variation) -> f64| {
-            std::array::from_fn(|lane| 1.0 / (value * factor(&variations[lane])))
-        };
+        let lanes = |value: f64, factor: fn(&Variation) -> f64| std::array::from_fn(|lane| value * factor(&variations[lane]));
+        let inverse_lanes =
+            |value: f64, factor: fn(&Variation) -> f64| std::array::from_fn(|lane| 1.0 / (value * factor(&variations[lane])));
         Self {
             x,
             y,
@@ -94,32 +78,22 @@ impl Constants {
             xx,
             xy,
             yy,
-            torque: vehicle
-                .rotors
-                .map(|rotor| f64::from(rotor.direction) * vehicle.torque_coefficient),
+            torque: vehicle.rotors.map(|rotor| f64::from(rotor.direction) * vehicle.torque_coefficient),
             lift: vehicle.translational_lift,
             lift_moments,
             flapping: vehicle.flapping,
             inertia: rows(&inertia),
             inverse_inertia: rows(&inverse),
             inverse_principal: principal.map(|moment| 1.0 / moment),
-            couple: std::array::from_fn(|axis| {
-                (principal[(axis + 1) % 3] - principal[(axis + 2) % 3]) / principal[axis]
-            }),
+            couple: std::array::from_fn(|axis| (principal[(axis + 1) % 3] - principal[(axis + 2) % 3]) / principal[axis]),
             speed_min: vehicle.rotor_speed_min,
             speed_max: vehicle.rotor_speed_max,
             inverse_mass: inverse_lanes(vehicle.mass, |variation| variation.payload_factor),
-            thrust: lanes(vehicle.thrust_coefficient, |variation| {
-                variation.thrust_factor
-            }),
+            thrust: lanes(vehicle.thrust_coefficient, |variation| variation.thrust_factor),
             drag_xy: lanes(vehicle.rotor_drag, |variation| variation.drag_factor),
             drag_z: lanes(vehicle.inflow_drag, |variation| variation.drag_factor),
-            parasitic: vehicle
-                .parasitic_drag
-                .map(|drag| lanes(drag, |variation| variation.drag_factor)),
-            motor_rate: inverse_lanes(vehicle.motor_time_constant, |variation| {
-                variation.motor_lag_factor
-            }),
+            parasitic: vehicle.parasitic_drag.map(|drag| lanes(drag, |variation| variation.drag_factor)),
+            motor_rate: inverse_lanes(vehicle.motor_time_constant, |variation| variation.motor_lag_factor),
         }
     }
 
@@ -131,11 +105,7 @@ impl Constants {
             thrust: self.thrust[lane],
             drag_xy: self.drag_xy[lane],
             drag_z: self.drag_z[lane],
-            parasitic: [
-                self.parasitic[0][lane],
-                self.parasitic[1][lane],
-                self.parasitic[2][lane],
-            ],
+            parasitic: [self.parasitic[0][lane], self.parasitic[1][lane], self.parasitic[2][lane]],
             motor_rate: self.motor_rate[lane],
         }
     }
@@ -144,16 +114,8 @@ impl Constants {
     #[inline(always)]
     pub(super) fn clamp(&self, commands: [f64; 4]) -> [f64; 4] {
         commands.map(|command| {
-            let command = if command < self.speed_min {
-                self.speed_min
-            } else {
-                command
-            };
-            if command > self.speed_max {
-                self.speed_max
-            } else {
-                command
-            }
+            let command = if command < self.speed_min { self.speed_min } else { command };
+            if command > self.speed_max { self.speed_max } else { command }
         })
     }
 }

@@ -17,22 +17,14 @@ impl Motion {
         let ([vx, vy, vz], [p, q, r]) = (self.velocity, self.body_rates);
         let [qw, qx, qy, qz] = self.attitude;
         Self {
-            velocity: [
-                vx + factor * rate.velocity[0],
-                vy + factor * rate.velocity[1],
-                vz + factor * rate.velocity[2],
-            ],
+            velocity: [vx + factor * rate.velocity[0], vy + factor * rate.velocity[1], vz + factor * rate.velocity[2]],
             attitude: [
                 qw + factor * rate.attitude[0],
                 qx + factor * rate.attitude[1],
                 qy + factor * rate.attitude[2],
                 qz + factor * rate.attitude[3],
             ],
-            body_rates: [
-                p + factor * rate.body_rates[0],
-                q + factor * rate.body_rates[1],
-                r + factor * rate.body_rates[2],
-            ],
+            body_rates: [p + factor * rate.body_rates[0], q + factor * rate.body_rates[1], r + factor * rate.body_rates[2]],
         }
     }
 
@@ -50,12 +42,7 @@ impl Motion {
         Self {
             velocity: sum(&self.velocity, &b.velocity, &c.velocity, &d.velocity),
             attitude: sum(&self.attitude, &b.attitude, &c.attitude, &d.attitude),
-            body_rates: sum(
-                &self.body_rates,
-                &b.body_rates,
-                &c.body_rates,
-                &d.body_rates,
-            ),
+            body_rates: sum(&self.body_rates, &b.body_rates, &c.body_rates, &d.body_rates),
         }
     }
 }
@@ -71,11 +58,7 @@ impl Rotation {
         let (xx, yy, zz) = (x * sx, y * sy, z * sz);
         let (xy, xz, yz) = (x * sy, x * sz, y * sz);
         let (wx, wy, wz) = (w * sx, w * sy, w * sz);
-        Self([
-            [1.0 - (yy + zz), xy - wz, xz + wy],
-            [xy + wz, 1.0 - (xx + zz), yz - wx],
-            [xz - wy, yz + wx, 1.0 - (xx + yy)],
-        ])
+        Self([[1.0 - (yy + zz), xy - wz, xz + wy], [xy + wz, 1.0 - (xx + zz), yz - wx], [xz - wy, yz + wx, 1.0 - (xx + yy)]])
     }
 
     #[inline(always)]
@@ -107,11 +90,7 @@ pub(super) fn multiply(m: &[[f64; 3]; 3], v: &[f64; 3]) -> [f64; 3] {
 /// Vector product a x b.
 #[inline(always)]
 pub(super) fn cross(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// Sum over the rotors of a times b.

@@ -31,9 +31,7 @@ fn rows(file: &str) -> Vec<Row> {
             let values = names.iter().zip(&record).skip(1);
             Row {
                 set: record[0].to_owned(),
-                values: values
-                    .map(|(name, text)| (name.to_owned(), text.parse().unwrap()))
-                    .collect(),
+                values: values.map(|(name, text)| (name.to_owned(), text.parse().unwrap())).collect(),
             }
         })
         .collect()
@@ -48,17 +46,9 @@ fn vehicles() -> BTreeMap<String, Vehicle> {
         .map(|(name, set)| {
             let constants = &set["params"];
             let number = |key: &str| constants[key].as_f64().unwrap();
-            let aero = if set["aero"].as_bool().unwrap() {
-                1.0
-            } else {
-                0.0
-            };
+            let aero = if set["aero"].as_bool().unwrap() { 1.0 } else { 0.0 };
             let rotor = |index: usize| Rotor {
-                position: std::array::from_fn(|axis| {
-                    constants["rotor_pos"][format!("r{}", index + 1)][axis]
-                        .as_f64()
-                        .unwrap()
-                }),
+                position: std::array::from_fn(|axis| constants["rotor_pos"][format!("r{}", index + 1)][axis].as_f64().unwrap()),
                 direction: constants["rotor_directions"][index].as_i64().unwrap() as i8,
             };
             let vehicle = Vehicle {
@@ -81,10 +71,7 @@ fn vehicles() -> BTreeMap<String, Vehicle> {
                     yz: number("Iyz"),
                     xz: number("Ixz"),
                 },
-                attitude_gains: AttitudeGains {
-                    proportional: number("kp_att"),
-                    derivative: number("kd_att"),
-                },
+                attitude_gains: AttitudeGains { proportional: number("kp_att"), derivative: number("kd_att") },
                 rotors: std::array::from_fn(rotor),
                 ..Vehicle::named("hummingbird").unwrap()
             };
@@ -96,10 +83,7 @@ fn vehicles() -> BTreeMap<String, Vehicle> {
 
 fn plants() -> BTreeMap<String, Plant> {
     let plant = |vehicle| Plant::new(&vehicle, [Variation::default(); LANES]);
-    vehicles()
-        .into_iter()
-        .map(|(name, vehicle)| (name, plant(vehicle)))
-        .collect()
+    vehicles().into_iter().map(|(name, vehicle)| (name, plant(vehicle))).collect()
 }
 
 fn state(row: &Row, prefix: &str) -> State {
@@ -119,9 +103,7 @@ fn inputs(row: &Row) -> (States, [Lanes; 4], Disturbance) {
     for lane in 0..LANES {
         disturbance.set_lane(lane, row.get(["windx", "windy", "windz"]), [0.0; 3]);
     }
-    let commands = row
-        .get(["c1", "c2", "c3", "c4"])
-        .map(|command| [command; LANES]);
+    let commands = row.get(["c1", "c2", "c3", "c4"]).map(|command| [command; LANES]);
     (States::splat(&state(row, "")), commands, disturbance)
 }
 
@@ -148,10 +130,7 @@ impl Worst {
         assert_eq!(self.0.len(), limits.len());
         for (group, limit) in limits {
             let (value, place) = &self.0[group];
-            assert!(
-                value <= limit,
-                "{group}: {value:e} in {place}, limit {limit:e}"
-            );
+            assert!(value <= limit, "{group}: {value:e} in {place}, limit {limit:e}");
         }
     }
 }
@@ -167,46 +146,17 @@ fn derivatives_and_wrenches_are_the_reference_simulators() {
         let rate = plant.derivative(&states, &commands, &disturbance).lane(3);
         let wrench = plant.wrench(&states, &disturbance)[3];
         let mut add = |group, deviation| worst.add(group, deviation, &row);
-        add(
-            "position",
-            deviation(rate.position, row.get(["dx", "dy", "dz"])),
-        );
-        add(
-            "velocity",
-            deviation(rate.velocity, row.get(["dvx", "dvy", "dvz"])),
-        );
-        add(
-            "attitude",
-            deviation(rate.attitude, row.get(["dqw", "dqx", "dqy", "dqz"])),
-        );
-        add(
-            "body rates",
-            deviation(rate.body_rates, row.get(["dwx", "dwy", "dwz"])),
-        );
-        add(
-            "rotors",
-            deviation(rate.rotor_speeds, row.get(["dr1", "dr2", "dr3", "dr4"])),
-        );
-        add(
-            "force",
-            deviation(wrench.force, row.get(["FBx", "FBy", "FBz"])),
-        );
-        add(
-            "moment",
-            deviation(wrench.moment, row.get(["MBx", "MBy", "MBz"])),
-        );
+        add("position", deviation(rate.position, row.get(["dx", "dy", "dz"])));
+        add("velocity", deviation(rate.velocity, row.get(["dvx", "dvy", "dvz"])));
+        add("attitude", deviation(rate.attitude, row.get(["dqw", "dqx", "dqy", "dqz"])));
+        add("body rates", deviation(rate.body_rates, row.get(["dwx", "dwy", "dwz"])));
+        add("rotors", deviation(rate.rotor_speeds, row.get(["dr1", "dr2", "dr3", "dr4"])));
+        add("force", deviation(wrench.force, row.get(["FBx", "FBy", "FBz"])));
+        add("moment", deviation(wrench.moment, row.get(["MBx", "MBy", "MBz"])));
         count += 1;
     }
     assert_eq!(count, 1336);
-    let groups = [
-        "position",
-        "velocity",
-        "attitude",
-        "body rates",
-        "rotors",
-        "force",
-        "moment",
-    ];
+    let groups = ["position", "velocity", "attitude", "body rates", "rotors", "force", "moment"];
     worst.assert_below(&groups.map(|group| (group, 1e-13)));
 }
 
@@ -217,11 +167,7 @@ fn steps_follow_the_reference_solution() {
     let plants = plants();
     let rows = rows("step.csv");
     assert_eq!(rows.len(), 720);
-    for (longest, crazyflies, others) in [
-        (0.002, 1.5e-7, 3e-4),
-        (0.001, 1e-8, 2e-5),
-        (0.00025, 4e-11, 6e-8),
-    ] {
+    for (longest, crazyflies, others) in [(0.002, 1.5e-7, 3e-4), (0.001, 1e-8, 2e-5), (0.00025, 4e-11, 6e-8)] {
         let mut worst = [Worst::default(), Worst::default()];
         for row in &rows {
             let (mut states, commands, disturbance) = inputs(row);
@@ -249,17 +195,11 @@ fn steps_follow_the_reference_solution() {
 #[test]
 fn the_vehicle_files_hold_the_reference_parameters() {
     let reference = vehicles();
-    for (name, set) in [
-        ("crazyflie", "crazyflie_aero"),
-        ("crazyflie-brushless", "brushless_aero"),
-        ("hummingbird", "hummingbird_aero"),
-    ] {
+    for (name, set) in
+        [("crazyflie", "crazyflie_aero"), ("crazyflie-brushless", "brushless_aero"), ("hummingbird", "hummingbird_aero")]
+    {
         let ours = Vehicle::named(name).unwrap();
-        let theirs = Vehicle {
-            name: name.to_owned(),
-            position_gains: ours.position_gains.clone(),
-            ..reference[set].clone()
-        };
+        let theirs = Vehicle { name: name.to_owned(), position_gains: ours.position_gains.clone(), ..reference[set].clone() };
         assert_eq!(ours, theirs);
     }
 }

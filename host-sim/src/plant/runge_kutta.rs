@@ -27,14 +27,7 @@ impl<'a, M: Model> Step<'a, M> {
         disturbance: &'a Disturbance,
         duration: f64,
     ) -> Self {
-        Self {
-            constants,
-            states,
-            commands,
-            disturbance,
-            duration,
-            model: PhantomData,
-        }
+        Self { constants, states, commands, disturbance, duration, model: PhantomData }
     }
 }
 
@@ -43,13 +36,7 @@ impl<M: Model> WithSimd for Step<'_, M> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        step::<M>(
-            self.constants,
-            self.states,
-            self.commands,
-            self.disturbance,
-            self.duration,
-        );
+        step::<M>(self.constants, self.states, self.commands, self.disturbance, self.duration);
     }
 }
 
@@ -61,13 +48,7 @@ impl<M: Model> WithSimd for Step<'_, M> {
 /// equation with a constant command, so that each stage is the speed plus a multiple, known beforehand, of the
 /// distance to the command. Both are the Runge-Kutta step, rearranged.
 #[inline(always)]
-fn step<M: Model>(
-    constants: &Constants,
-    states: &mut States,
-    commands: &[Lanes; 4],
-    disturbance: &Disturbance,
-    duration: f64,
-) {
+fn step<M: Model>(constants: &Constants, states: &mut States, commands: &[Lanes; 4], disturbance: &Disturbance, duration: f64) {
     let half = 0.5 * duration;
     let sixth = duration / 6.0;
     let sixth_squared = duration * sixth;
@@ -84,12 +65,7 @@ fn step<M: Model>(
         };
         let speeds = gather(&states.rotor_speeds, lane);
         let command = constants.clamp(gather(commands, lane));
-        let distance: [f64; 4] = [
-            command[0] - speeds[0],
-            command[1] - speeds[1],
-            command[2] - speeds[2],
-            command[3] - speeds[3],
-        ];
+        let distance: [f64; 4] = [command[0] - speeds[0], command[1] - speeds[1], command[2] - speeds[2], command[3] - speeds[3]];
         let ratio = duration * own.motor_rate;
         let second = 0.5 * ratio;
         let third = second * (1.0 - second);
@@ -111,8 +87,7 @@ fn step<M: Model>(
         let finish = start.advance(&rate, sixth);
         for axis in 0..3 {
             next.position[axis][lane] += duration * start.velocity[axis]
-                + sixth_squared
-                    * (rate1.velocity[axis] + rate2.velocity[axis] + rate3.velocity[axis]);
+                + sixth_squared * (rate1.velocity[axis] + rate2.velocity[axis] + rate3.velocity[axis]);
         }
         let [w, x, y, z] = finish.attitude;
         let scale = 1.0 / ((w * w + x * x) + (y * y + z * z)).sqrt();
@@ -120,11 +95,7 @@ fn step<M: Model>(
         scatter(&mut next.velocity, lane, &finish.velocity);
         scatter(&mut next.attitude, lane, &attitude);
         scatter(&mut next.body_rates, lane, &finish.body_rates);
-        scatter(
-            &mut next.rotor_speeds,
-            lane,
-            &advance(&speeds, &distance, last),
-        );
+        scatter(&mut next.rotor_speeds, lane, &advance(&speeds, &distance, last));
     }
     *states = next;
 }

@@ -24,13 +24,7 @@ pub struct State {
 impl State {
     /// At rest and level at `position` (m, world ENU), the rotors standing still.
     pub const fn at_rest(position: [f64; 3]) -> Self {
-        Self {
-            position,
-            velocity: [0.0; 3],
-            attitude: [1.0, 0.0, 0.0, 0.0],
-            body_rates: [0.0; 3],
-            rotor_speeds: [0.0; 4],
-        }
+        Self { position, velocity: [0.0; 3], attitude: [1.0, 0.0, 0.0, 0.0], body_rates: [0.0; 3], rotor_speeds: [0.0; 4] }
     }
 }
 

@@ -54,13 +54,7 @@ fn every_instruction_set_gives_the_same_bits() {
             states
         };
         let portable = run(Arch::Scalar);
-        assert!(
-            portable
-                .position
-                .as_flattened()
-                .iter()
-                .all(|value| value.is_finite())
-        );
+        assert!(portable.position.as_flattened().iter().all(|value| value.is_finite()));
         assert_eq!(run(plant.arch), portable);
         #[cfg(target_arch = "x86_64")]
         if let Some(narrower) = pulp::x86::V3::try_new() {
@@ -100,29 +94,13 @@ fn the_planar_form_is_the_full_one_simplified() {
         }
         let simple = Plant::new(&vehicle, varied());
         assert_ne!(simple.form, Form::Full);
-        let full = Plant {
-            form: Form::Full,
-            ..simple.clone()
-        };
+        let full = Plant { form: Form::Full, ..simple.clone() };
         let (states, commands, disturbance) = flights();
-        let (a, b) = (
-            simple.derivative(&states, &commands, &disturbance),
-            full.derivative(&states, &commands, &disturbance),
-        );
-        for (a, b) in a
-            .body_rates
-            .as_flattened()
-            .iter()
-            .zip(b.body_rates.as_flattened())
-        {
+        let (a, b) = (simple.derivative(&states, &commands, &disturbance), full.derivative(&states, &commands, &disturbance));
+        for (a, b) in a.body_rates.as_flattened().iter().zip(b.body_rates.as_flattened()) {
             assert!((a - b).abs() <= 1e-12 * b.abs().max(1.0), "{a} {b}");
         }
-        for (a, b) in a
-            .velocity
-            .as_flattened()
-            .iter()
-            .zip(b.velocity.as_flattened())
-        {
+        for (a, b) in a.velocity.as_flattened().iter().zip(b.velocity.as_flattened()) {
             assert!((a - b).abs() <= 1e-12 * b.abs().max(1.0), "{a} {b}");
         }
     }
@@ -132,10 +110,7 @@ fn the_planar_form_is_the_full_one_simplified() {
 fn the_variations_and_the_disturbance_act_on_their_own_terms() {
     let vehicle = Vehicle::named("crazyflie").unwrap();
     let hover = (vehicle.mass * GRAVITY / (4.0 * vehicle.thrust_coefficient)).sqrt();
-    let state = State {
-        rotor_speeds: [hover; 4],
-        ..State::at_rest([0.0; 3])
-    };
+    let state = State { rotor_speeds: [hover; 4], ..State::at_rest([0.0; 3]) };
     let mut variations = [Variation::default(); LANES];
     variations[1].payload_factor = 1.25;
     variations[2].thrust_factor = 0.9;
@@ -150,26 +125,17 @@ fn the_variations_and_the_disturbance_act_on_their_own_terms() {
     let commands = [[hover + 72.0; LANES]; 4];
     let rate = plant.derivative(&States::splat(&state), &commands, &disturbance);
     let close = |found: f64, expected: f64| {
-        assert!(
-            (found - expected).abs() < 1e-12,
-            "{found} instead of {expected}"
-        );
+        assert!((found - expected).abs() < 1e-12, "{found} instead of {expected}");
     };
     close(rate.velocity[2][6], 0.0);
     close(rate.velocity[2][1], GRAVITY * (1.0 / 1.25 - 1.0));
     close(rate.velocity[2][2], -0.1 * GRAVITY);
     close(rate.rotor_speeds[0][3], 0.5 * rate.rotor_speeds[0][6]);
     // Blown along with the wind, four times as strongly with four times the drag.
-    close(
-        rate.velocity[0][0],
-        2.0 * 4.0 * hover * vehicle.rotor_drag / vehicle.mass,
-    );
+    close(rate.velocity[0][0], 2.0 * 4.0 * hover * vehicle.rotor_drag / vehicle.mass);
     close(rate.velocity[0][4], 4.0 * rate.velocity[0][0]);
     for axis in 0..3 {
-        close(
-            rate.velocity[axis][5] - rate.velocity[axis][6],
-            [0.1, -0.2, 0.3][axis],
-        );
+        close(rate.velocity[axis][5] - rate.velocity[axis][6], [0.1, -0.2, 0.3][axis]);
     }
 }
 
@@ -194,10 +160,7 @@ fn quaternions_stay_normalised_and_a_torque_free_body_keeps_its_momentum() {
     vehicle.inflow_drag = 0.0;
     vehicle.translational_lift = 0.0;
     let plant = Plant::new(&vehicle, [Variation::default(); LANES]);
-    let state = State {
-        body_rates: [3.0, 0.1, 2.0],
-        ..State::at_rest([0.0; 3])
-    };
+    let state = State { body_rates: [3.0, 0.1, 2.0], ..State::at_rest([0.0; 3]) };
     let mut states = States::splat(&state);
     let momentum = |state: &State| {
         let inertia = vehicle.inertia.matrix();
@@ -206,12 +169,7 @@ fn quaternions_stay_normalised_and_a_torque_free_body_keeps_its_momentum() {
     };
     let before = momentum(&states.lane(0));
     for _ in 0..5000 {
-        plant.step(
-            &mut states,
-            &[[0.0; LANES]; 4],
-            &Disturbance::default(),
-            0.002,
-        );
+        plant.step(&mut states, &[[0.0; LANES]; 4], &Disturbance::default(), 0.002);
     }
     let after = states.lane(0);
     let length: f64 = after.attitude.iter().map(|value| value * value).sum();

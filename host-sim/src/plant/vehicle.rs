@@ -10,14 +10,8 @@ use serde::{Deserialize, Serialize};
 /// The vehicle files that the program carries: (name, TOML text).
 const EMBEDDED: [(&str, &str); 3] = [
     ("crazyflie", include_str!("../../vehicles/crazyflie.toml")),
-    (
-        "crazyflie-brushless",
-        include_str!("../../vehicles/crazyflie-brushless.toml"),
-    ),
-    (
-        "hummingbird",
-        include_str!("../../vehicles/hummingbird.toml"),
-    ),
+    ("crazyflie-brushless", include_str!("../../vehicles/crazyflie-brushless.toml")),
+    ("hummingbird", include_str!("../../vehicles/hummingbird.toml")),
 ];
 
 /// A quadrotor: what flies, and the gains it is flown with. SI units, body frame FLU about the centre of mass.
@@ -81,9 +75,7 @@ pub struct Inertia {
 impl Inertia {
     /// The 3x3 matrix, kg m², body FLU.
     pub fn matrix(&self) -> Matrix3<f64> {
-        Matrix3::new(
-            self.xx, self.xy, self.xz, self.xy, self.yy, self.yz, self.xz, self.yz, self.zz,
-        )
+        Matrix3::new(self.xx, self.xy, self.xz, self.xy, self.yy, self.yz, self.xz, self.yz, self.zz)
     }
 
     /// Whether the principal axes are the body's axes.
@@ -171,10 +163,7 @@ impl Vehicle {
     pub fn named(name: &str) -> Result<Self, VehicleError> {
         match EMBEDDED.iter().find(|(known, _)| *known == name) {
             Some((_, text)) => Self::from_toml(text),
-            None => Err(VehicleError::UnknownName {
-                name: name.to_owned(),
-                known: Self::names().collect::<Vec<_>>().join(", "),
-            }),
+            None => Err(VehicleError::UnknownName { name: name.to_owned(), known: Self::names().collect::<Vec<_>>().join(", ") }),
         }
     }
 
@@ -193,19 +182,11 @@ impl Vehicle {
     /// # Errors
     /// An unknown name; the message lists the known ones.
     pub fn position_gains(&self, name: &str) -> Result<PositionGains, VehicleError> {
-        self.position_gains
-            .get(name)
-            .copied()
-            .ok_or_else(|| VehicleError::UnknownGains {
-                vehicle: self.name.clone(),
-                name: name.to_owned(),
-                known: self
-                    .position_gains
-                    .keys()
-                    .cloned()
-                    .collect::<Vec<_>>()
-                    .join(", "),
-            })
+        self.position_gains.get(name).copied().ok_or_else(|| VehicleError::UnknownGains {
+            vehicle: self.name.clone(),
+            name: name.to_owned(),
+            known: self.position_gains.keys().cloned().collect::<Vec<_>>().join(", "),
+        })
     }
 }
 
@@ -218,33 +199,16 @@ mod tests {
         for name in Vehicle::names() {
             let vehicle = Vehicle::named(name).expect(name);
             assert_eq!(vehicle.name, name);
-            assert_eq!(
-                vehicle.position_gains("stock").unwrap().proportional,
-                [6.5, 6.5, 15.0]
-            );
-            assert_eq!(
-                vehicle.position_gains("soft").unwrap().derivative,
-                [2.02; 3]
-            );
+            assert_eq!(vehicle.position_gains("stock").unwrap().proportional, [6.5, 6.5, 15.0]);
+            assert_eq!(vehicle.position_gains("soft").unwrap().derivative, [2.02; 3]);
         }
     }
 
     #[test]
     fn unknown_names_are_answered_with_the_known_ones() {
         let message = Vehicle::named("crazyfly").unwrap_err().to_string();
-        assert!(
-            message.contains("`crazyfly`")
-                && message.contains("crazyflie, crazyflie-brushless, hummingbird"),
-            "{message}"
-        );
-        let message = Vehicle::named("crazyflie")
-            .unwrap()
-            .position_gains("hard")
-            .unwrap_err()
-            .to_string();
-        assert!(
-            message.contains("`hard`") && message.contains("soft, stock"),
-            "{message}"
-        );
+        assert!(message.contains("`crazyfly`") && message.contains("crazyflie, crazyflie-brushless, hummingbird"), "{message}");
+        let message = Vehicle::named("crazyflie").unwrap().position_gains("hard").unwrap_err().to_string();
+        assert!(message.contains("`hard`") && message.contains("soft, stock"), "{message}");
     }
 }

@@ -16,13 +16,7 @@ pub struct Wrench {
 /// The terms of the equations that a kind of vehicle has.
 pub(super) trait Model {
     /// Wrench of rotors and air. `air`: airspeed v_a, m/s, body; `rates`: w, rad/s, body; `speeds`: O_i, rad/s.
-    fn wrench(
-        shared: &Constants,
-        own: &LaneConstants,
-        air: &[f64; 3],
-        rates: &[f64; 3],
-        speeds: &[f64; 4],
-    ) -> Wrench;
+    fn wrench(shared: &Constants, own: &LaneConstants, air: &[f64; 3], rates: &[f64; 3], speeds: &[f64; 4]) -> Wrench;
 
     /// J^-1 (M - w x J w), rad/s², body.
     fn angular_acceleration(shared: &Constants, moment: &[f64; 3], rates: &[f64; 3]) -> [f64; 3];
@@ -52,12 +46,7 @@ pub(super) fn derivative<M: Model>(
             force[1] * own.inverse_mass + pushed[1],
             force[2] * own.inverse_mass + (pushed[2] - GRAVITY),
         ],
-        attitude: [
-            -(x * hp + y * hq + z * hr),
-            w * hp + y * hr - z * hq,
-            w * hq + z * hp - x * hr,
-            w * hr + x * hq - y * hp,
-        ],
+        attitude: [-(x * hp + y * hq + z * hr), w * hp + y * hr - z * hq, w * hq + z * hp - x * hr, w * hr + x * hq - y * hp],
         body_rates: M::angular_acceleration(shared, &moment, &motion.body_rates),
     }
 }
@@ -75,12 +64,7 @@ impl<const LIFT: bool> Model for Planar<LIFT> {
         &[p, q, r]: &[f64; 3],
         speeds: &[f64; 4],
     ) -> Wrench {
-        let squares = [
-            speeds[0] * speeds[0],
-            speeds[1] * speeds[1],
-            speeds[2] * speeds[2],
-            speeds[3] * speeds[3],
-        ];
+        let squares = [speeds[0] * speeds[0], speeds[1] * speeds[1], speeds[2] * speeds[2], speeds[3] * speeds[3]];
         // Moments of the speeds: sum O, sum O x, sum O y, sum O x^2, sum O x y, sum O y^2.
         let s = total(speeds);
         let (sx, sy) = (dot(speeds, &shared.x), dot(speeds, &shared.y));
@@ -89,10 +73,8 @@ impl<const LIFT: bool> Model for Planar<LIFT> {
         let syy = dot(speeds, &shared.yy);
         // With v_i = (ax - r y, ay + r x, az + p y - q x):
         let mut lift = own.thrust * total(&squares) - own.drag_z * (s * az + p * sy - q * sx);
-        let mut roll =
-            own.thrust * dot(&squares, &shared.y) - own.drag_z * (sy * az + p * syy - q * sxy);
-        let mut pitch =
-            own.drag_z * (sx * az + p * sxy - q * sxx) - own.thrust * dot(&squares, &shared.x);
+        let mut roll = own.thrust * dot(&squares, &shared.y) - own.drag_z * (sy * az + p * syy - q * sxy);
+        let mut pitch = own.drag_z * (sx * az + p * sxy - q * sxx) - own.thrust * dot(&squares, &shared.x);
         if LIFT {
             let square = ax * ax + ay * ay;
             let (turn, rr) = (2.0 * r, r * r);
@@ -102,25 +84,13 @@ impl<const LIFT: bool> Model for Planar<LIFT> {
             pitch -= square * gx + turn * (ay * gxx - ax * gxy) + rr * gsx;
         }
         Wrench {
-            force: [
-                own.drag_xy * (r * sy - s * ax),
-                -own.drag_xy * (s * ay + r * sx),
-                lift,
-            ],
-            moment: [
-                roll,
-                pitch,
-                dot(&squares, &shared.torque) - own.drag_xy * (sx * ay - sy * ax + r * (sxx + syy)),
-            ],
+            force: [own.drag_xy * (r * sy - s * ax), -own.drag_xy * (s * ay + r * sx), lift],
+            moment: [roll, pitch, dot(&squares, &shared.torque) - own.drag_xy * (sx * ay - sy * ax + r * (sxx + syy))],
         }
     }
 
     #[inline(always)]
-    fn angular_acceleration(
-        shared: &Constants,
-        moment: &[f64; 3],
-        &[p, q, r]: &[f64; 3],
-    ) -> [f64; 3] {
+    fn angular_acceleration(shared: &Constants, moment: &[f64; 3], &[p, q, r]: &[f64; 3]) -> [f64; 3] {
         let (inverse, couple) = (&shared.inverse_principal, &shared.couple);
         [
             moment[0] * inverse[0] + couple[0] * (q * r),
@@ -135,34 +105,20 @@ pub(super) struct Full;
 
 impl Model for Full {
     #[inline(always)]
-    fn wrench(
-        shared: &Constants,
-        own: &LaneConstants,
-        air: &[f64; 3],
-        rates: &[f64; 3],
-        speeds: &[f64; 4],
-    ) -> Wrench {
+    fn wrench(shared: &Constants, own: &LaneConstants, air: &[f64; 3], rates: &[f64; 3], speeds: &[f64; 4]) -> Wrench {
         let airspeed = (air[0] * air[0] + air[1] * air[1] + air[2] * air[2]).sqrt();
-        let mut force = [
-            -airspeed * own.parasitic[0] * air[0],
-            -airspeed * own.parasitic[1] * air[1],
-            -airspeed * own.parasitic[2] * air[2],
-        ];
+        let mut force =
+            [-airspeed * own.parasitic[0] * air[0], -airspeed * own.parasitic[1] * air[1], -airspeed * own.parasitic[2] * air[2]];
         let mut moment = [0.0; 3];
         for (rotor, &speed) in speeds.iter().enumerate() {
             let position = [shared.x[rotor], shared.y[rotor], shared.z[rotor]];
             let turning = cross(rates, &position);
-            let local = [
-                air[0] + turning[0],
-                air[1] + turning[1],
-                air[2] + turning[2],
-            ];
+            let local = [air[0] + turning[0], air[1] + turning[1], air[2] + turning[2]];
             let square = speed * speed;
             let push = [
                 -own.drag_xy * speed * local[0],
                 -own.drag_xy * speed * local[1],
-                own.thrust * square - own.drag_z * speed * local[2]
-                    + shared.lift * (local[0] * local[0] + local[1] * local[1]),
+                own.thrust * square - own.drag_z * speed * local[2] + shared.lift * (local[0] * local[0] + local[1] * local[1]),
             ];
             let lever = cross(&position, &push);
             let flap = shared.flapping * speed;
@@ -179,13 +135,6 @@ impl Model for Full {
     #[inline(always)]
     fn angular_acceleration(shared: &Constants, moment: &[f64; 3], rates: &[f64; 3]) -> [f64; 3] {
         let gyration = cross(rates, &multiply(&shared.inertia, rates));
-        multiply(
-            &shared.inverse_inertia,
-            &[
-                moment[0] - gyration[0],
-                moment[1] - gyration[1],
-                moment[2] - gyration[2],
-            ],
-        )
+        multiply(&shared.inverse_inertia, &[moment[0] - gyration[0], moment[1] - gyration[1], moment[2] - gyration[2]])
     }
 }

@@ -12,9 +12,7 @@ pub struct DelayLine<T> {
 
 /// A delay longer than a [`DelayLine`] holds.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error(
-    "a delay of {ticks} ticks is longer than the {limit} that are allowed; check its unit and the tick length"
-)]
+#[error("a delay of {ticks} ticks is longer than the {limit} that are allowed; check its unit and the tick length")]
 pub struct DelayError {
     /// The delay that was asked for.
     pub ticks: usize,
@@ -32,16 +30,9 @@ impl<T: Clone> DelayLine<T> {
     /// A delay above [`DelayLine::LIMIT`].
     pub fn new(ticks: usize) -> Result<Self, DelayError> {
         if ticks > Self::LIMIT {
-            return Err(DelayError {
-                ticks,
-                limit: Self::LIMIT,
-            });
+            return Err(DelayError { ticks, limit: Self::LIMIT });
         }
-        Ok(Self {
-            ticks,
-            ring: Vec::with_capacity(ticks),
-            oldest: 0,
-        })
+        Ok(Self { ticks, ring: Vec::with_capacity(ticks), oldest: 0 })
     }
 
     /// The delay, in ticks.

@@ -5,9 +5,7 @@
 //! output is overwritten by its gradient on the way back: nothing is allocated in a step.
 
 use super::elementwise::{AdamFactors, adam, apply_tanh, column_sums, sum_of_squares};
-use super::matrix_kernel::{
-    Accumulate, Bias, Store, TimesReluDerivative, TimesTanhDerivative, product,
-};
+use super::matrix_kernel::{Accumulate, Bias, Store, TimesReluDerivative, TimesTanhDerivative, product};
 use super::padded_matrix::PaddedMatrix;
 use super::quantisation::{round_activations, round_weights};
 use impromptu_model_export::float_network::{Activation, DenseLayer};
@@ -26,39 +24,23 @@ impl Parameter {
     pub(super) fn new(value: PaddedMatrix) -> Self {
         let gradient = PaddedMatrix::zeros(value.rows, value.columns);
         let zeros = vec![0.0; value.values.len()];
-        Self {
-            value,
-            gradient,
-            first: zeros.clone(),
-            second: zeros,
-        }
+        Self { value, gradient, first: zeros.clone(), second: zeros }
     }
 
     /// From `[outputs][inputs]`, as networks are stored.
     pub(super) fn from_rows_of_outputs(weights: &[f32], inputs: usize, outputs: usize) -> Self {
-        Self::new(PaddedMatrix::from_fn(inputs, outputs, |input, output| {
-            weights[output * inputs + input]
-        }))
+        Self::new(PaddedMatrix::from_fn(inputs, outputs, |input, output| weights[output * inputs + input]))
     }
 
     /// To `[outputs][inputs]`.
     pub(super) fn to_rows_of_outputs(&self) -> Vec<f32> {
         let (inputs, outputs) = (self.value.rows, self.value.columns);
-        (0..outputs * inputs)
-            .map(|index| self.value.row(index % inputs)[index / inputs])
-            .collect()
+        (0..outputs * inputs).map(|index| self.value.row(index % inputs)[index / inputs]).collect()
     }
 
     fn update(&mut self, arch: Arch, factors: AdamFactors) {
         let (value, gradient) = (&mut self.value.values, &self.gradient.values);
-        adam(
-            arch,
-            factors,
-            value,
-            gradient,
-            &mut self.first,
-            &mut self.second,
-        );
+        adam(arch, factors, value, gradient, &mut self.first, &mut self.second);
     }
 }
 
@@ -92,20 +74,13 @@ pub(super) struct Backpropagation {
 
 impl Backpropagation {
     /// For batches of up to `batch` rows.
-    pub(super) fn new(
-        inputs: usize,
-        layers: &[DenseLayer],
-        skip: Option<Parameter>,
-        batch: usize,
-    ) -> Self {
+    pub(super) fn new(inputs: usize, layers: &[DenseLayer], skip: Option<Parameter>, batch: usize) -> Self {
         let mut width = inputs;
         let layers = layers.iter().map(|layer| {
             let outputs = layer.outputs();
             let trained = TrainedLayer {
                 weights: Parameter::from_rows_of_outputs(&layer.weights, width, outputs),
-                bias: Parameter::new(PaddedMatrix::from_fn(1, outputs, |_, output| {
-                    layer.bias[output]
-                })),
+                bias: Parameter::new(PaddedMatrix::from_fn(1, outputs, |_, output| layer.bias[output])),
                 activation: layer.activation,
                 used: None,
                 transposed: PaddedMatrix::zeros(outputs, width),
@@ -116,20 +91,9 @@ impl Backpropagation {
             trained
         });
         let layers: Vec<TrainedLayer> = layers.collect();
-        let widest = layers
-            .iter()
-            .map(|layer| layer.weights.value.stride)
-            .max()
-            .unwrap_or(0);
+        let widest = layers.iter().map(|layer| layer.weights.value.stride).max().unwrap_or(0);
         let inputs = PaddedMatrix::zeros(batch, inputs);
-        let mut network = Self {
-            arch: Arch::new(),
-            layers,
-            skip,
-            inputs,
-            rounded_inputs: None,
-            scales: vec![0.0; widest],
-        };
+        let mut network = Self { arch: Arch::new(), layers, skip, inputs, rounded_inputs: None, scales: vec![0.0; widest] };
         network.prepare();
         network
     }
@@ -157,10 +121,7 @@ impl Backpropagation {
             }
             // Nobody asks for the gradient of the network's inputs.
             if index > 0 {
-                layer.transposed.copy_transposed(
-                    self.arch,
-                    layer.used.as_ref().unwrap_or(&layer.weights.value),
-                );
+                layer.transposed.copy_transposed(self.arch, layer.used.as_ref().unwrap_or(&layer.weights.value));
             }
         }
     }
@@ -168,8 +129,7 @@ impl Backpropagation {
     /// The outputs for the first `rows` rows of the inputs.
     pub(super) fn forward(&mut self, rows: usize) -> &mut PaddedMatrix {
         let arch = self.arch;
-        if let (Some(rounded), Some(range)) = (&mut self.rounded_inputs, self.layers[0].input_range)
-        {
+        if let (Some(rounded), Some(range)) = (&mut self.rounded_inputs, self.layers[0].input_range) {
             rounded.values.copy_from_slice(&self.inputs.values);
             round_activations(arch, rounded, rows, range);
         }
@@ -178,29 +138,13 @@ impl Backpropagation {
             let (before, from_here) = self.layers.split_at_mut(index);
             let layer = &mut from_here[0];
             let first_input = self.rounded_inputs.as_ref().unwrap_or(&self.inputs);
-            let input = before
-                .last()
-                .map_or(first_input, |previous| &previous.output);
+            let input = before.last().map_or(first_input, |previous| &previous.output);
             let weights = layer.used.as_ref().unwrap_or(&layer.weights.value);
             let (shape, bias) = ((rows, weights.rows), &layer.bias.value.values[..]);
             match layer.activation {
-                Activation::Relu => product::<false>(
-                    arch,
-                    shape,
-                    input,
-                    weights,
-                    &mut layer.output,
-                    Bias::<true>(bias),
-                ),
+                Activation::Relu => product::<false>(arch, shape, input, weights, &mut layer.output, Bias::<true>(bias)),
                 Activation::Tanh | Activation::Linear => {
-                    product::<false>(
-                        arch,
-                        shape,
-                        input,
-                        weights,
-                        &mut layer.output,
-                        Bias::<false>(bias),
-                    );
+                    product::<false>(arch, shape, input, weights, &mut layer.output, Bias::<false>(bias));
                 }
             }
             if layer.activation == Activation::Tanh {
@@ -210,20 +154,9 @@ impl Backpropagation {
                 round_activations(arch, &mut layer.output, rows, range);
             }
         }
-        let output = &mut self
-            .layers
-            .last_mut()
-            .expect("a network in training has a layer")
-            .output;
+        let output = &mut self.layers.last_mut().expect("a network in training has a layer").output;
         if let Some(skip) = &self.skip {
-            product::<false>(
-                arch,
-                (rows, skip.value.rows),
-                &self.inputs,
-                &skip.value,
-                output,
-                Accumulate,
-            );
+            product::<false>(arch, (rows, skip.value.rows), &self.inputs, &skip.value, output, Accumulate);
         }
         output
     }
@@ -236,68 +169,29 @@ impl Backpropagation {
             let (before, from_here) = self.layers.split_at_mut(index);
             let layer = &mut from_here[0];
             let first_input = self.rounded_inputs.as_ref().unwrap_or(&self.inputs);
-            let input = before
-                .last()
-                .map_or(first_input, |previous| &previous.output);
+            let input = before.last().map_or(first_input, |previous| &previous.output);
             let shape = (layer.weights.value.rows, rows);
-            product::<true>(
-                arch,
-                shape,
-                input,
-                &layer.output,
-                &mut layer.weights.gradient,
-                Store,
-            );
+            product::<true>(arch, shape, input, &layer.output, &mut layer.weights.gradient, Store);
             column_sums(arch, &layer.output, rows, &mut layer.bias.gradient);
             if let Some(previous) = before.last_mut() {
                 let (shape, target) = ((rows, layer.transposed.rows), &mut previous.output);
                 let (gradient, weights) = (&layer.output, &layer.transposed);
                 match previous.activation {
-                    Activation::Relu => product::<false>(
-                        arch,
-                        shape,
-                        gradient,
-                        weights,
-                        target,
-                        TimesReluDerivative,
-                    ),
-                    Activation::Tanh => product::<false>(
-                        arch,
-                        shape,
-                        gradient,
-                        weights,
-                        target,
-                        TimesTanhDerivative,
-                    ),
-                    Activation::Linear => {
-                        product::<false>(arch, shape, gradient, weights, target, Store)
-                    }
+                    Activation::Relu => product::<false>(arch, shape, gradient, weights, target, TimesReluDerivative),
+                    Activation::Tanh => product::<false>(arch, shape, gradient, weights, target, TimesTanhDerivative),
+                    Activation::Linear => product::<false>(arch, shape, gradient, weights, target, Store),
                 }
             }
         }
         if let (Some(skip), Some(last)) = (&mut self.skip, self.layers.last()) {
-            product::<true>(
-                arch,
-                (skip.value.rows, rows),
-                &self.inputs,
-                &last.output,
-                &mut skip.gradient,
-                Store,
-            );
+            product::<true>(arch, (skip.value.rows, rows), &self.inputs, &last.output, &mut skip.gradient, Store);
         }
     }
 
     /// The norm of the whole gradient.
     pub(super) fn gradient_norm(&self) -> f64 {
-        let parameters = self
-            .layers
-            .iter()
-            .flat_map(|layer| [&layer.weights, &layer.bias])
-            .chain(&self.skip);
-        parameters
-            .map(|parameter| sum_of_squares(self.arch, &parameter.gradient.values))
-            .sum::<f64>()
-            .sqrt()
+        let parameters = self.layers.iter().flat_map(|layer| [&layer.weights, &layer.bias]).chain(&self.skip);
+        parameters.map(|parameter| sum_of_squares(self.arch, &parameter.gradient.values)).sum::<f64>().sqrt()
     }
 
     /// One Adam step; biases are not decayed.
@@ -305,13 +199,7 @@ impl Backpropagation {
         let arch = self.arch;
         for layer in &mut self.layers {
             layer.weights.update(arch, factors);
-            layer.bias.update(
-                arch,
-                AdamFactors {
-                    shrink: 1.0,
-                    ..factors
-                },
-            );
+            layer.bias.update(arch, AdamFactors { shrink: 1.0, ..factors });
         }
         if let Some(skip) = &mut self.skip {
             skip.update(arch, factors);
@@ -322,10 +210,7 @@ impl Backpropagation {
     /// The largest magnitude of each layer's inputs over the first rows, after [`Backpropagation::forward`].
     pub(super) fn raise_to_largest_inputs(&self, rows: usize, largest: &mut [f32]) {
         let outputs = self.layers.iter().map(|layer| &layer.output);
-        for (largest, matrix) in largest
-            .iter_mut()
-            .zip(std::iter::once(&self.inputs).chain(outputs))
-        {
+        for (largest, matrix) in largest.iter_mut().zip(std::iter::once(&self.inputs).chain(outputs)) {
             let values = (0..rows).flat_map(|row| matrix.row(row));
             *largest = values.fold(*largest, |largest, value| largest.max(value.abs()));
         }
@@ -333,21 +218,14 @@ impl Backpropagation {
 
     /// Keeps the values of all parameters in `kept`, which has the same layers.
     pub(super) fn store_values(&self, kept: &mut Vec<PaddedMatrix>) {
-        let parameters = self
-            .layers
-            .iter()
-            .flat_map(|layer| [&layer.weights, &layer.bias])
-            .chain(&self.skip);
+        let parameters = self.layers.iter().flat_map(|layer| [&layer.weights, &layer.bias]).chain(&self.skip);
         kept.clear();
         kept.extend(parameters.map(|parameter| parameter.value.clone()));
     }
 
     /// Takes back what [`Backpropagation::store_values`] kept.
     pub(super) fn restore_values(&mut self, kept: Vec<PaddedMatrix>) {
-        let parameters = self
-            .layers
-            .iter_mut()
-            .flat_map(|layer| [&mut layer.weights, &mut layer.bias]);
+        let parameters = self.layers.iter_mut().flat_map(|layer| [&mut layer.weights, &mut layer.bias]);
         for (parameter, value) in parameters.chain(&mut self.skip).zip(kept) {
             parameter.value = value;
         }

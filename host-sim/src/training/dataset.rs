@@ -10,10 +10,7 @@ pub struct RowMatrix {
 impl RowMatrix {
     /// No rows of `columns` values each.
     pub fn new(columns: usize) -> Self {
-        Self {
-            columns,
-            values: Vec::new(),
-        }
+        Self { columns, values: Vec::new() }
     }
 
     /// Rows one after another; `None` unless the values fill whole rows.
@@ -26,11 +23,7 @@ impl RowMatrix {
     /// # Panics
     /// If the row has another number of columns.
     pub fn push(&mut self, row: &[f32]) {
-        assert_eq!(
-            row.len(),
-            self.columns,
-            "a row has as many values as the matrix has columns"
-        );
+        assert_eq!(row.len(), self.columns, "a row has as many values as the matrix has columns");
         self.values.extend_from_slice(row);
     }
 
@@ -113,56 +106,27 @@ impl Dataset {
     pub fn new(inputs: RowMatrix, labels: RowMatrix) -> Result<Self, DatasetError> {
         let rows = inputs.rows();
         if rows == 0 || labels.columns() == 0 {
-            return Err(DatasetError::Empty {
-                inputs: inputs.columns(),
-                labels: labels.columns(),
-                rows,
-            });
+            return Err(DatasetError::Empty { inputs: inputs.columns(), labels: labels.columns(), rows });
         }
         if labels.rows() != rows {
-            return Err(DatasetError::Length {
-                rows,
-                what: "rows of labels",
-                found: labels.rows(),
-            });
+            return Err(DatasetError::Length { rows, what: "rows of labels", found: labels.rows() });
         }
         for (what, table) in [("inputs", &inputs), ("labels", &labels)] {
             if let Some(index) = table.values().iter().position(|value| !value.is_finite()) {
                 let (row, column) = (index / table.columns(), index % table.columns());
-                return Err(DatasetError::Value {
-                    what,
-                    row,
-                    column,
-                    value: table.values()[index],
-                });
+                return Err(DatasetError::Value { what, row, column, value: table.values()[index] });
             }
         }
-        Ok(Self {
-            inputs,
-            labels,
-            row_weights: None,
-        })
+        Ok(Self { inputs, labels, row_weights: None })
     }
 
     /// Weights of the rows, at least one above zero; only their ratios count.
     pub fn with_row_weights(mut self, weights: Vec<f32>) -> Result<Self, DatasetError> {
         if weights.len() != self.rows() {
-            return Err(DatasetError::Length {
-                rows: self.rows(),
-                what: "row weights",
-                found: weights.len(),
-            });
+            return Err(DatasetError::Length { rows: self.rows(), what: "row weights", found: weights.len() });
         }
-        if let Some(row) = weights
-            .iter()
-            .position(|weight| !weight.is_finite() || *weight < 0.0)
-        {
-            return Err(DatasetError::Value {
-                what: "row weights",
-                row,
-                column: 0,
-                value: weights[row],
-            });
+        if let Some(row) = weights.iter().position(|weight| !weight.is_finite() || *weight < 0.0) {
+            return Err(DatasetError::Value { what: "row weights", row, column: 0, value: weights[row] });
         }
         if weights.iter().all(|weight| *weight == 0.0) {
             return Err(DatasetError::NoWeight);
@@ -191,12 +155,8 @@ impl Dataset {
         let Some(weights) = &self.row_weights else {
             return vec![1.0; self.rows()];
         };
-        let mean =
-            weights.iter().map(|weight| f64::from(*weight)).sum::<f64>() / weights.len() as f64;
-        weights
-            .iter()
-            .map(|weight| f64::from(*weight) / mean)
-            .collect()
+        let mean = weights.iter().map(|weight| f64::from(*weight)).sum::<f64>() / weights.len() as f64;
+        weights.iter().map(|weight| f64::from(*weight) / mean).collect()
     }
 }
 
@@ -218,11 +178,7 @@ pub(super) fn moments(table: &RowMatrix, row_weights: &[f64]) -> (Vec<f64>, Vec<
     let scales = means.iter().zip(variances).map(|(mean, variance)| {
         let deviation = variance.sqrt();
         // Below the resolution of f32 the column is a constant with rounding noise.
-        if deviation > 1e-6 * mean.abs() && deviation > 1e-20 {
-            deviation
-        } else {
-            1.0
-        }
+        if deviation > 1e-6 * mean.abs() && deviation > 1e-20 { deviation } else { 1.0 }
     });
     let scales = scales.collect();
     (means, scales)
@@ -239,36 +195,15 @@ mod tests {
     #[test]
     fn refuses_unusable_rows_by_name() {
         let labels = table(1, &[1.0, 2.0]);
-        let error = |inputs: RowMatrix| {
-            Dataset::new(inputs, labels.clone())
-                .unwrap_err()
-                .to_string()
-        };
-        assert!(
-            error(table(2, &[1.0, 2.0, 3.0, f32::NAN]))
-                .contains("row 1 of the inputs is not usable at column 1")
-        );
+        let error = |inputs: RowMatrix| Dataset::new(inputs, labels.clone()).unwrap_err().to_string();
+        assert!(error(table(2, &[1.0, 2.0, 3.0, f32::NAN])).contains("row 1 of the inputs is not usable at column 1"));
         assert!(error(table(1, &[1.0])).contains("1 rows of inputs, but 2 rows of labels"));
         assert!(error(RowMatrix::new(3)).contains("empty"));
         assert!(RowMatrix::from_values(2, vec![1.0; 3]).is_none());
         let data = Dataset::new(table(1, &[1.0, 2.0]), labels).unwrap();
-        assert!(
-            data.clone()
-                .with_row_weights(vec![1.0, -1.0])
-                .unwrap_err()
-                .to_string()
-                .contains("row 1 of the row weights")
-        );
-        assert_eq!(
-            data.clone().with_row_weights(vec![0.0; 2]),
-            Err(DatasetError::NoWeight)
-        );
-        assert_eq!(
-            data.with_row_weights(vec![1.0, 3.0])
-                .unwrap()
-                .relative_row_weights(),
-            [0.5, 1.5]
-        );
+        assert!(data.clone().with_row_weights(vec![1.0, -1.0]).unwrap_err().to_string().contains("row 1 of the row weights"));
+        assert_eq!(data.clone().with_row_weights(vec![0.0; 2]), Err(DatasetError::NoWeight));
+        assert_eq!(data.with_row_weights(vec![1.0, 3.0]).unwrap().relative_row_weights(), [0.5, 1.5]);
     }
 
     #[test]

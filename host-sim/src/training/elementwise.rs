@@ -23,15 +23,7 @@ pub(super) fn tanh(x: f32) -> f32 {
     let power = shifted - ROUND;
     let r = power.mul_add(-LN2_LOW, power.mul_add(-LN2_HIGH, twice));
     let mut series = 1.0 / 5040.0;
-    for coefficient in [
-        1.0 / 720.0,
-        1.0 / 120.0,
-        1.0 / 24.0,
-        1.0 / 6.0,
-        0.5,
-        1.0,
-        1.0,
-    ] {
+    for coefficient in [1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0] {
         series = r.mul_add(series, coefficient);
     }
     let two_to_power = f32::from_bits((shifted.to_bits() << 23).wrapping_add(127 << 23));
@@ -70,8 +62,7 @@ pub(super) fn column_sums(arch: Arch, matrix: &PaddedMatrix, rows: usize, sums: 
             for first in (0..width).step_by(LANES) {
                 let mut totals = [0.0f32; LANES];
                 for row in matrix.values.chunks_exact(stride).take(rows) {
-                    let values: &[f32; LANES] =
-                        row[first..].first_chunk().expect("rows are padded");
+                    let values: &[f32; LANES] = row[first..].first_chunk().expect("rows are padded");
                     for (total, value) in totals.iter_mut().zip(values) {
                         *total += value;
                     }
@@ -128,27 +119,17 @@ pub(super) fn adam(
     first: &mut [f32],
     second: &mut [f32],
 ) {
-    let AdamFactors {
-        beta1,
-        beta2,
-        rate,
-        root_correction,
-        epsilon,
-        shrink,
-        gradient_factor,
-    } = factors;
+    let AdamFactors { beta1, beta2, rate, root_correction, epsilon, shrink, gradient_factor } = factors;
     arch.dispatch(
         #[inline(always)]
         || {
             let (values, first, second) = (values, first, second);
             let moments = first.iter_mut().zip(second.iter_mut());
-            for ((value, gradient), (first, second)) in values.iter_mut().zip(gradient).zip(moments)
-            {
+            for ((value, gradient), (first, second)) in values.iter_mut().zip(gradient).zip(moments) {
                 let gradient = gradient * gradient_factor;
                 *first = beta1 * *first + (1.0 - beta1) * gradient;
                 *second = beta2 * *second + (1.0 - beta2) * (gradient * gradient);
-                *value =
-                    shrink * *value - rate * *first / (second.sqrt() * root_correction + epsilon);
+                *value = shrink * *value - rate * *first / (second.sqrt() * root_correction + epsilon);
             }
         },
     );
@@ -172,22 +153,13 @@ mod tests {
 
     #[test]
     fn vector_code_has_the_bits_of_scalar_code() {
-        let source = PaddedMatrix::from_fn(4, 37, |row, column| {
-            (row as f32 - 1.5) * column as f32 * 0.13
-        });
+        let source = PaddedMatrix::from_fn(4, 37, |row, column| (row as f32 - 1.5) * column as f32 * 0.13);
         let (mut vector, mut scalar) = (source.clone(), source.clone());
         apply_tanh(Arch::new(), &mut vector, 3);
         apply_tanh(Arch::Scalar, &mut scalar, 3);
         assert_eq!(vector, scalar);
-        assert_eq!(
-            vector.row(3),
-            source.row(3),
-            "rows behind the batch are left alone"
-        );
-        assert_eq!(
-            sum_of_squares(Arch::new(), &source.values),
-            sum_of_squares(Arch::Scalar, &source.values)
-        );
+        assert_eq!(vector.row(3), source.row(3), "rows behind the batch are left alone");
+        assert_eq!(sum_of_squares(Arch::new(), &source.values), sum_of_squares(Arch::Scalar, &source.values));
     }
 
     #[test]
@@ -204,14 +176,7 @@ mod tests {
             gradient_factor: 1.0,
         };
         let (mut values, mut first, mut second) = ([1.0f32, 2.0, 0.0], [0.0; 3], [0.0; 3]);
-        adam(
-            Arch::new(),
-            factors,
-            &mut values,
-            &[3.0, -1e-3, 0.0],
-            &mut first,
-            &mut second,
-        );
+        adam(Arch::new(), factors, &mut values, &[3.0, -1e-3, 0.0], &mut first, &mut second);
         for (value, expected) in values.iter().zip([0.5 - rate, 1.0 + rate, 0.0]) {
             assert!((value - expected).abs() < 1e-5, "{value} {expected}");
         }

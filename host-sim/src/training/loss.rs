@@ -8,10 +8,7 @@ impl Loss {
     #[inline]
     fn of(self, error: f32) -> (f32, f32) {
         match self {
-            Self::Huber { delta } if error.abs() > delta => (
-                delta * (2.0 * error.abs() - delta),
-                (2.0 * delta).copysign(error),
-            ),
+            Self::Huber { delta } if error.abs() > delta => (delta * (2.0 * error.abs() - delta), (2.0 * delta).copysign(error)),
             Self::MeanSquare | Self::Huber { .. } => (error * error, 2.0 * error),
         }
     }
@@ -28,11 +25,7 @@ impl Loss {
     ) -> f64 {
         let mut total = 0.0;
         for (row, row_weight) in row_weights.iter().enumerate() {
-            let values = outputs
-                .row_mut(row)
-                .iter_mut()
-                .zip(targets.row(row))
-                .zip(output_weights);
+            let values = outputs.row_mut(row).iter_mut().zip(targets.row(row)).zip(output_weights);
             for ((value, target), output_weight) in values {
                 let weight = row_weight * output_weight;
                 let (loss, slope) = self.of(*value - target);
@@ -60,17 +53,8 @@ mod tests {
     fn weights_rows_and_outputs_and_leaves_the_rest() {
         let mut outputs = PaddedMatrix::from_fn(3, 2, |row, column| (row + column) as f32);
         let targets = PaddedMatrix::zeros(3, 2);
-        let total = Loss::MeanSquare.replace_by_gradient(
-            &mut outputs,
-            &targets,
-            &[1.0, 2.0],
-            &[1.0, 0.5],
-            0.5,
-        );
+        let total = Loss::MeanSquare.replace_by_gradient(&mut outputs, &targets, &[1.0, 2.0], &[1.0, 0.5], 0.5);
         assert_eq!(total, 0.5 + 2.0 * (1.0 + 0.5 * 4.0));
-        assert_eq!(
-            [outputs.row(0), outputs.row(1), outputs.row(2)],
-            [[0.0, 0.5], [2.0, 2.0], [2.0, 3.0]]
-        );
+        assert_eq!([outputs.row(0), outputs.row(1), outputs.row(2)], [[0.0, 0.5], [2.0, 2.0], [2.0, 3.0]]);
     }
 }

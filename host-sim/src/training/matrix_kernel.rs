@@ -65,11 +65,7 @@ impl<const RECTIFY: bool> Edge for Bias<'_, RECTIFY> {
     }
     #[inline(always)]
     fn finish<S: Simd>(self, simd: S, sum: S::f32s, _: S::f32s) -> S::f32s {
-        if RECTIFY {
-            simd.max_f32s(sum, simd.splat_f32s(0.0))
-        } else {
-            sum
-        }
+        if RECTIFY { simd.max_f32s(sum, simd.splat_f32s(0.0)) } else { sum }
     }
 }
 
@@ -100,10 +96,7 @@ impl Edge for TimesTanhDerivative {
     }
     #[inline(always)]
     fn finish<S: Simd>(self, simd: S, sum: S::f32s, present: S::f32s) -> S::f32s {
-        simd.mul_f32s(
-            sum,
-            simd.mul_add_f32s(simd.neg_f32s(present), present, simd.splat_f32s(1.0)),
-        )
+        simd.mul_f32s(sum, simd.mul_add_f32s(simd.neg_f32s(present), present, simd.splat_f32s(1.0)))
     }
 }
 
@@ -118,14 +111,7 @@ pub(super) fn product<const LEFT_TRANSPOSED: bool>(
     edge: impl Edge,
 ) {
     debug_assert_eq!(b.columns, c.columns);
-    arch.dispatch(Product::<_, LEFT_TRANSPOSED> {
-        rows,
-        depth,
-        a,
-        b,
-        c,
-        edge,
-    });
+    arch.dispatch(Product::<_, LEFT_TRANSPOSED> { rows, depth, a, b, c, edge });
 }
 
 /// The plain product of two matrices: `c = a · b`.
@@ -133,11 +119,7 @@ pub(super) fn product<const LEFT_TRANSPOSED: bool>(
 /// # Panics
 /// If the shapes do not fit.
 pub fn multiply(arch: Arch, a: &PaddedMatrix, b: &PaddedMatrix, c: &mut PaddedMatrix) {
-    assert_eq!(
-        (a.rows, b.columns, a.columns),
-        (c.rows, c.columns, b.rows),
-        "rows, columns and depth must fit"
-    );
+    assert_eq!((a.rows, b.columns, a.columns), (c.rows, c.columns, b.rows), "rows, columns and depth must fit");
     product::<false>(arch, (a.rows, a.columns), a, b, c, Store);
 }
 
@@ -188,12 +170,7 @@ impl<E: Edge, const LEFT_TRANSPOSED: bool> Product<'_, E, LEFT_TRANSPOSED> {
     }
 
     #[inline(always)]
-    fn tile<S: Simd, const ROWS: usize, const VECTORS: usize>(
-        &mut self,
-        simd: S,
-        row: usize,
-        column: usize,
-    ) {
+    fn tile<S: Simd, const ROWS: usize, const VECTORS: usize>(&mut self, simd: S, row: usize, column: usize) {
         let span = VECTORS * S::F32_LANES;
         let (a, stride) = (&self.a.values[..], self.c.stride);
         let mut sums = [[simd.splat_f32s(0.0); VECTORS]; ROWS];
@@ -206,33 +183,19 @@ impl<E: Edge, const LEFT_TRANSPOSED: bool> Product<'_, E, LEFT_TRANSPOSED> {
         let rows_of_b = self.b.values.chunks_exact(self.b.stride).take(self.depth);
         if LEFT_TRANSPOSED {
             for (row_of_a, row_of_b) in a.chunks_exact(self.a.stride).zip(rows_of_b) {
-                let left: &[f32; ROWS] = row_of_a[row..]
-                    .first_chunk()
-                    .expect("rows of the result lie within a");
-                multiply_add(
-                    simd,
-                    &mut sums,
-                    *left,
-                    vectors_of::<S, VECTORS>(&row_of_b[column..]),
-                );
+                let left: &[f32; ROWS] = row_of_a[row..].first_chunk().expect("rows of the result lie within a");
+                multiply_add(simd, &mut sums, *left, vectors_of::<S, VECTORS>(&row_of_b[column..]));
             }
         } else {
             // Slices of one known length: the compiler then drops the bounds checks on `step`.
-            let lefts: [&[f32]; ROWS] =
-                core::array::from_fn(|r| &a[(row + r) * self.a.stride..][..self.depth]);
+            let lefts: [&[f32]; ROWS] = core::array::from_fn(|r| &a[(row + r) * self.a.stride..][..self.depth]);
             for (step, row_of_b) in rows_of_b.enumerate() {
                 let left = core::array::from_fn(|r| lefts[r][step]);
-                multiply_add(
-                    simd,
-                    &mut sums,
-                    left,
-                    vectors_of::<S, VECTORS>(&row_of_b[column..]),
-                );
+                multiply_add(simd, &mut sums, left, vectors_of::<S, VECTORS>(&row_of_b[column..]));
             }
         }
         for (r, sums) in sums.iter().enumerate() {
-            let out =
-                S::as_mut_simd_f32s(&mut self.c.values[(row + r) * stride + column..][..span]).0;
+            let out = S::as_mut_simd_f32s(&mut self.c.values[(row + r) * stride + column..][..span]).0;
             for (slot, sum) in out.iter_mut().zip(sums) {
                 *slot = self.edge.finish(simd, *sum, *slot);
             }
@@ -242,10 +205,7 @@ impl<E: Edge, const LEFT_TRANSPOSED: bool> Product<'_, E, LEFT_TRANSPOSED> {
 
 #[inline(always)]
 fn vectors_of<S: Simd, const VECTORS: usize>(row: &[f32]) -> [S::f32s; VECTORS] {
-    *S::as_simd_f32s(&row[..VECTORS * S::F32_LANES])
-        .0
-        .first_chunk()
-        .expect("rows are padded to whole vectors")
+    *S::as_simd_f32s(&row[..VECTORS * S::F32_LANES]).0.first_chunk().expect("rows are padded to whole vectors")
 }
 
 #[inline(always)]
@@ -268,39 +228,22 @@ mod tests {
     use super::*;
 
     fn filled(rows: usize, columns: usize) -> PaddedMatrix {
-        PaddedMatrix::from_fn(rows, columns, |row, column| {
-            ((row * 31 + column * 17) % 23) as f32 / 7.0 - 1.5
-        })
+        PaddedMatrix::from_fn(rows, columns, |row, column| ((row * 31 + column * 17) % 23) as f32 / 7.0 - 1.5)
     }
 
     /// One chain of fused multiply-adds for each element, as the module promises.
-    fn expected(
-        a: impl Fn(usize, usize) -> f32,
-        b: &PaddedMatrix,
-        row: usize,
-        column: usize,
-        start: f32,
-    ) -> f32 {
-        (0..b.rows).fold(start, |sum, step| {
-            a(row, step).mul_add(b.row(step)[column], sum)
-        })
+    fn expected(a: impl Fn(usize, usize) -> f32, b: &PaddedMatrix, row: usize, column: usize, start: f32) -> f32 {
+        (0..b.rows).fold(start, |sum, step| a(row, step).mul_add(b.row(step)[column], sum))
     }
 
     #[test]
     fn products_have_the_bits_of_the_plain_loop_for_any_shape() {
-        for (rows, depth, columns) in [
-            (1, 1, 1),
-            (13, 12, 40),
-            (16, 6, 128),
-            (5, 33, 6),
-            (24, 128, 48),
-        ] {
+        for (rows, depth, columns) in [(1, 1, 1), (13, 12, 40), (16, 6, 128), (5, 33, 6), (24, 128, 48)] {
             let (a, b) = (filled(rows, depth), filled(depth, columns));
             let mut c = PaddedMatrix::zeros(rows, columns);
             multiply(Arch::new(), &a, &b, &mut c);
-            let plain = PaddedMatrix::from_fn(rows, columns, |row, column| {
-                expected(|row, step| a.row(row)[step], &b, row, column, 0.0)
-            });
+            let plain =
+                PaddedMatrix::from_fn(rows, columns, |row, column| expected(|row, step| a.row(row)[step], &b, row, column, 0.0));
             assert_eq!(c, plain);
             assert_eq!(
                 {
@@ -314,13 +257,7 @@ mod tests {
             let left = filled(depth, rows);
             product::<true>(Arch::new(), (rows, depth), &left, &b, &mut c, Accumulate);
             let sum = PaddedMatrix::from_fn(rows, columns, |row, column| {
-                expected(
-                    |row, step| left.row(step)[row],
-                    &b,
-                    row,
-                    column,
-                    plain.row(row)[column],
-                )
+                expected(|row, step| left.row(step)[row], &b, row, column, plain.row(row)[column])
             });
             assert_eq!(c, sum);
         }
@@ -329,46 +266,21 @@ mod tests {
     #[test]
     fn edges_apply_bias_rectifier_and_derivatives() {
         let (a, b, bias) = (filled(9, 5), filled(5, 20), filled(1, 20));
-        let sum = |row: usize, column: usize, start: f32| {
-            expected(|row, step| a.row(row)[step], &b, row, column, start)
-        };
+        let sum = |row: usize, column: usize, start: f32| expected(|row, step| a.row(row)[step], &b, row, column, start);
         let mut output = PaddedMatrix::zeros(9, 20);
-        product::<false>(
-            Arch::new(),
-            (9, 5),
-            &a,
-            &b,
-            &mut output,
-            Bias::<true>(&bias.values),
-        );
-        let rectified = PaddedMatrix::from_fn(9, 20, |row, column| {
-            sum(row, column, bias.row(0)[column]).max(0.0)
-        });
+        product::<false>(Arch::new(), (9, 5), &a, &b, &mut output, Bias::<true>(&bias.values));
+        let rectified = PaddedMatrix::from_fn(9, 20, |row, column| sum(row, column, bias.row(0)[column]).max(0.0));
         assert_eq!(output, rectified);
-        product::<false>(
-            Arch::new(),
-            (9, 5),
-            &a,
-            &b,
-            &mut output,
-            TimesReluDerivative,
+        product::<false>(Arch::new(), (9, 5), &a, &b, &mut output, TimesReluDerivative);
+        let derivative = PaddedMatrix::from_fn(
+            9,
+            20,
+            |row, column| {
+                if rectified.row(row)[column] > 0.0 { sum(row, column, 0.0) } else { 0.0 }
+            },
         );
-        let derivative = PaddedMatrix::from_fn(9, 20, |row, column| {
-            if rectified.row(row)[column] > 0.0 {
-                sum(row, column, 0.0)
-            } else {
-                0.0
-            }
-        });
         assert_eq!(output, derivative);
-        product::<false>(
-            Arch::new(),
-            (9, 5),
-            &a,
-            &b,
-            &mut output,
-            TimesTanhDerivative,
-        );
+        product::<false>(Arch::new(), (9, 5), &a, &b, &mut output, TimesTanhDerivative);
         let derivative = PaddedMatrix::from_fn(9, 20, |row, column| {
             let h = derivative.row(row)[column];
             sum(row, column, 0.0) * (-h).mul_add(h, 1.0)

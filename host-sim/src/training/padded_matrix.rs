@@ -21,20 +21,11 @@ impl PaddedMatrix {
     /// All zeros.
     pub fn zeros(rows: usize, columns: usize) -> Self {
         let stride = (columns.div_ceil(LANES) | 1) * LANES;
-        Self {
-            rows,
-            columns,
-            stride,
-            values: vec![0.0; rows * stride],
-        }
+        Self { rows, columns, stride, values: vec![0.0; rows * stride] }
     }
 
     /// The element of each row and column is `value(row, column)`.
-    pub fn from_fn(
-        rows: usize,
-        columns: usize,
-        mut value: impl FnMut(usize, usize) -> f32,
-    ) -> Self {
+    pub fn from_fn(rows: usize, columns: usize, mut value: impl FnMut(usize, usize) -> f32) -> Self {
         let mut matrix = Self::zeros(rows, columns);
         for row in 0..rows {
             for (column, slot) in matrix.row_mut(row).iter_mut().enumerate() {
@@ -154,12 +145,10 @@ mod tests {
     #[test]
     fn transposes_any_shape() {
         for (rows, columns) in [(1, 1), (6, 128), (128, 6), (33, 17)] {
-            let matrix =
-                PaddedMatrix::from_fn(rows, columns, |row, column| (row * 1000 + column) as f32);
+            let matrix = PaddedMatrix::from_fn(rows, columns, |row, column| (row * 1000 + column) as f32);
             let mut transposed = PaddedMatrix::zeros(columns, rows);
             transposed.copy_transposed(Arch::new(), &matrix);
-            let expected =
-                PaddedMatrix::from_fn(columns, rows, |row, column| (column * 1000 + row) as f32);
+            let expected = PaddedMatrix::from_fn(columns, rows, |row, column| (column * 1000 + row) as f32);
             assert_eq!(transposed, expected);
         }
     }

@@ -13,11 +13,7 @@ pub const LARGEST_WEIGHT: f32 = 127.0;
 
 /// The scale of one output row of weights.
 pub fn row_scale(row: &[f32]) -> f32 {
-    scale_of(
-        row.iter()
-            .fold(0.0, |largest: f32, weight| largest.max(weight.abs())),
-        LARGEST_WEIGHT,
-    )
+    scale_of(row.iter().fold(0.0, |largest: f32, weight| largest.max(weight.abs())), LARGEST_WEIGHT)
 }
 
 /// The network with each weight of its layers replaced by the nearest number that int8 can hold; biases and skip as they
@@ -28,8 +24,7 @@ pub fn with_rounded_weights(network: &FloatNetwork) -> FloatNetwork {
         let inputs = layer.weights.len() / layer.outputs().max(1);
         for row in layer.weights.chunks_exact_mut(inputs.max(1)) {
             let scale = row_scale(row);
-            row.iter_mut()
-                .for_each(|weight| *weight = round_to(*weight, scale, LARGEST_WEIGHT));
+            row.iter_mut().for_each(|weight| *weight = round_to(*weight, scale, LARGEST_WEIGHT));
         }
     }
     rounded
@@ -52,12 +47,7 @@ fn round_to(value: f32, scale: f32, limit: f32) -> f32 {
 
 /// Rounds the weights of one layer, `[inputs][outputs]` as in training; `scales` is scratch space of at least one padded
 /// row.
-pub(super) fn round_weights(
-    arch: Arch,
-    from: &PaddedMatrix,
-    to: &mut PaddedMatrix,
-    scales: &mut [f32],
-) {
+pub(super) fn round_weights(arch: Arch, from: &PaddedMatrix, to: &mut PaddedMatrix, scales: &mut [f32]) {
     let (stride, width) = (from.stride, from.width());
     arch.dispatch(
         #[inline(always)]
@@ -72,17 +62,9 @@ pub(super) fn round_weights(
                 }
             }
             for scale in scales.iter_mut() {
-                *scale = if *scale > 0.0 {
-                    *scale / LARGEST_WEIGHT
-                } else {
-                    1.0
-                };
+                *scale = if *scale > 0.0 { *scale / LARGEST_WEIGHT } else { 1.0 };
             }
-            for (source, target) in from
-                .values
-                .chunks_exact(stride)
-                .zip(to.values.chunks_exact_mut(stride))
-            {
+            for (source, target) in from.values.chunks_exact(stride).zip(to.values.chunks_exact_mut(stride)) {
                 for ((slot, weight), scale) in target.iter_mut().zip(source).zip(scales.iter()) {
                     *slot = round_to(*weight, *scale, LARGEST_WEIGHT);
                 }
@@ -92,12 +74,7 @@ pub(super) fn round_weights(
 }
 
 /// Rounds the first `rows` rows in place.
-pub(super) fn round_activations(
-    arch: Arch,
-    matrix: &mut PaddedMatrix,
-    rows: usize,
-    (scale, limit): (f32, f32),
-) {
+pub(super) fn round_activations(arch: Arch, matrix: &mut PaddedMatrix, rows: usize, (scale, limit): (f32, f32)) {
     arch.dispatch(
         #[inline(always)]
         || {
@@ -121,10 +98,7 @@ mod tests {
     fn rounds_half_away_from_zero_by_row() {
         assert_eq!(row_scale(&[1.0, -2.0]), 2.0 / 127.0);
         assert_eq!(row_scale(&[0.0]), 1.0);
-        assert_eq!(
-            [2.5, -2.5, 2.4, 300.0].map(|value| round_to(value, 1.0, 127.0)),
-            [3.0, -3.0, 2.0, 127.0]
-        );
+        assert_eq!([2.5, -2.5, 2.4, 300.0].map(|value| round_to(value, 1.0, 127.0)), [3.0, -3.0, 2.0, 127.0]);
         assert_eq!(activation_range(8.0, 4), (8.0 / 7.0, 7.0));
     }
 
@@ -132,19 +106,13 @@ mod tests {
     fn training_rounds_as_the_exporter_does() {
         let (inputs, outputs) = (13, 19);
         let weight = |input: usize, output: usize| {
-            if output == 3 {
-                0.0
-            } else {
-                ((input * 37 + output * 11) % 29) as f32 / 7.3 - 1.9
-            }
+            if output == 3 { 0.0 } else { ((input * 37 + output * 11) % 29) as f32 / 7.3 - 1.9 }
         };
         let network = FloatNetwork {
             input_mean: vec![0.0; inputs],
             input_scale: vec![1.0; inputs],
             layers: vec![DenseLayer {
-                weights: (0..outputs * inputs)
-                    .map(|index| weight(index % inputs, index / inputs))
-                    .collect(),
+                weights: (0..outputs * inputs).map(|index| weight(index % inputs, index / inputs)).collect(),
                 bias: vec![0.3; outputs],
                 activation: Activation::Linear,
             }],
@@ -161,10 +129,6 @@ mod tests {
         for (index, value) in exported.layers[0].weights.iter().enumerate() {
             assert_eq!(*value, rounded.row(index % inputs)[index / inputs]);
         }
-        assert_eq!(
-            with_rounded_weights(&exported),
-            exported,
-            "rounding twice changes nothing"
-        );
+        assert_eq!(with_rounded_weights(&exported), exported, "rounding twice changes nothing");
     }
 }

@@ -34,9 +34,7 @@ pub enum RidgeError {
     #[error("the ridge penalty is {0}; it must be zero or more")]
     Penalty(f64),
     /// The normal equations cannot be solved.
-    #[error(
-        "inputs are linear combinations of each other and the penalty {penalty} is too small; raise it"
-    )]
+    #[error("inputs are linear combinations of each other and the penalty {penalty} is too small; raise it")]
     Singular {
         /// The penalty that was asked for.
         penalty: f64,
@@ -59,16 +57,14 @@ impl Ridge {
             let rows = BLOCK_ROWS.min(data.rows() - first);
             // One column for each row of data: both sides of the product are then filled in the order of memory.
             let standardised = DMatrix::from_fn(inputs, rows, |column, row| {
-                (f64::from(data.inputs().row(first + row)[column]) - input_mean[column])
-                    / input_scale[column]
+                (f64::from(data.inputs().row(first + row)[column]) - input_mean[column]) / input_scale[column]
             });
             let mut weighted = standardised.clone();
             for (row, mut column) in weighted.column_iter_mut().enumerate() {
                 column *= row_weights[first + row] / data.rows() as f64;
             }
-            let residual = DMatrix::from_fn(rows, labels, |row, label| {
-                f64::from(data.labels().row(first + row)[label]) - intercept[label]
-            });
+            let residual =
+                DMatrix::from_fn(rows, labels, |row, label| f64::from(data.labels().row(first + row)[label]) - intercept[label]);
             gram.gemm(1.0, &weighted, &standardised.transpose(), 1.0);
             cross.gemm(1.0, &weighted, &residual, 1.0);
         }
@@ -81,22 +77,12 @@ impl Ridge {
         }
         let factor = gram.cholesky().ok_or(RidgeError::Singular { penalty })?;
         // Rounding can leave a tiny positive pivot where the exact one is zero: its solution would be noise.
-        let smallest_pivot = factor
-            .l_dirty()
-            .diagonal()
-            .iter()
-            .fold(f64::INFINITY, |least, pivot| least.min(*pivot));
+        let smallest_pivot = factor.l_dirty().diagonal().iter().fold(f64::INFINITY, |least, pivot| least.min(*pivot));
         if smallest_pivot.powi(2) < 1e-13 * largest {
             return Err(RidgeError::Singular { penalty });
         }
         let weights = factor.solve(&cross).transpose();
-        Ok(Self {
-            input_mean,
-            input_scale,
-            weights,
-            intercept,
-            label_scale,
-        })
+        Ok(Self { input_mean, input_scale, weights, intercept, label_scale })
     }
 
     /// The answer in f64, in the labels' units.
@@ -106,19 +92,8 @@ impl Ridge {
             .zip(self.input_mean.iter().zip(&self.input_scale))
             .map(|(input, (mean, scale))| (f64::from(*input) - mean) / scale)
             .collect();
-        let row = |index: usize| {
-            self.weights
-                .row(index)
-                .iter()
-                .zip(&standardised)
-                .map(|(w, s)| w * s)
-                .sum::<f64>()
-        };
-        self.intercept
-            .iter()
-            .enumerate()
-            .map(|(index, intercept)| intercept + row(index))
-            .collect()
+        let row = |index: usize| self.weights.row(index).iter().zip(&standardised).map(|(w, s)| w * s).sum::<f64>();
+        self.intercept.iter().enumerate().map(|(index, intercept)| intercept + row(index)).collect()
     }
 
     /// The same map as a network of a skip and no layers.
@@ -128,11 +103,7 @@ impl Ridge {
             .weights
             .row_iter()
             .zip(&self.label_scale)
-            .flat_map(|(row, scale)| {
-                row.iter()
-                    .map(|weight| (weight / scale) as f32)
-                    .collect::<Vec<_>>()
-            });
+            .flat_map(|(row, scale)| row.iter().map(|weight| (weight / scale) as f32).collect::<Vec<_>>());
         FloatNetwork {
             input_mean: narrow(&self.input_mean),
             input_scale: narrow(&self.input_scale),
@@ -152,10 +123,7 @@ mod tests {
 
     fn dataset(rows: usize, row: impl Fn(usize) -> (Vec<f32>, Vec<f32>)) -> Dataset {
         let (first_inputs, first_labels) = row(0);
-        let (mut inputs, mut labels) = (
-            RowMatrix::new(first_inputs.len()),
-            RowMatrix::new(first_labels.len()),
-        );
+        let (mut inputs, mut labels) = (RowMatrix::new(first_inputs.len()), RowMatrix::new(first_labels.len()));
         for index in 0..rows {
             let (x, y) = row(index);
             inputs.push(&x);
@@ -167,36 +135,22 @@ mod tests {
     #[test]
     fn equals_the_solution_on_paper() {
         // Inputs 0 and 2 have mean 1 and deviation 1: s = ∓1, labels ±3 round 4, so b = 3 / (1 + penalty).
-        let data = dataset(2, |row| {
-            (vec![2.0 * row as f32], vec![1.0 + 6.0 * row as f32])
-        });
+        let data = dataset(2, |row| (vec![2.0 * row as f32], vec![1.0 + 6.0 * row as f32]));
         let ridge = Ridge::fit(&data, 0.5).unwrap();
         assert_eq!(ridge.intercept, [4.0]);
         assert!((ridge.weights[(0, 0)] - 2.0).abs() < 1e-12);
         assert!((ridge.evaluate(&[2.0])[0] - 6.0).abs() < 1e-12);
         assert!((ridge.to_network().evaluate(&[2.0])[0] - 6.0).abs() < 1e-6);
         // A row of weight 3 counts as three rows.
-        let heavy = dataset(3, |row| {
-            (vec![[0.0, 1.0, 5.0][row]], vec![[1.0, 0.0, 2.0][row]])
-        });
-        let repeated = dataset(5, |row| {
-            (
-                vec![[0.0, 1.0, 5.0, 5.0, 5.0][row]],
-                vec![[1.0, 0.0, 2.0, 2.0, 2.0][row]],
-            )
-        });
-        let weighted =
-            Ridge::fit(&heavy.with_row_weights(vec![1.0, 1.0, 3.0]).unwrap(), 0.1).unwrap();
-        assert!(
-            (weighted.weights[(0, 0)] - Ridge::fit(&repeated, 0.1).unwrap().weights[(0, 0)]).abs()
-                < 1e-12
-        );
+        let heavy = dataset(3, |row| (vec![[0.0, 1.0, 5.0][row]], vec![[1.0, 0.0, 2.0][row]]));
+        let repeated = dataset(5, |row| (vec![[0.0, 1.0, 5.0, 5.0, 5.0][row]], vec![[1.0, 0.0, 2.0, 2.0, 2.0][row]]));
+        let weighted = Ridge::fit(&heavy.with_row_weights(vec![1.0, 1.0, 3.0]).unwrap(), 0.1).unwrap();
+        assert!((weighted.weights[(0, 0)] - Ridge::fit(&repeated, 0.1).unwrap().weights[(0, 0)]).abs() < 1e-12);
     }
 
     #[test]
     fn recovers_a_linear_map_over_several_blocks() {
-        let input =
-            |row: usize, column: usize| ((row * (7 + 4 * column) + column) % 101) as f32 / 10.0;
+        let input = |row: usize, column: usize| ((row * (7 + 4 * column) + column) % 101) as f32 / 10.0;
         let data = dataset(1500, |row| {
             let x: Vec<f32> = (0..3).map(|column| input(row, column)).collect();
             let y = vec![2.0 * x[0] - x[1] + 3.0, x[2] * 0.5 - 7.0];
@@ -204,15 +158,8 @@ mod tests {
         });
         let ridge = Ridge::fit(&data, 0.0).unwrap();
         let answer = ridge.evaluate(&[1.0, 2.0, 4.0, 9.0]);
-        assert!(
-            (answer[0] - 3.0).abs() < 1e-5 && (answer[1] + 5.0).abs() < 1e-5,
-            "{answer:?}"
-        );
-        assert_eq!(
-            ridge.weights[(0, 3)],
-            0.0,
-            "a constant input has no influence"
-        );
+        assert!((answer[0] - 3.0).abs() < 1e-5 && (answer[1] + 5.0).abs() < 1e-5, "{answer:?}");
+        assert_eq!(ridge.weights[(0, 3)], 0.0, "a constant input has no influence");
     }
 
     #[test]
@@ -221,10 +168,7 @@ mod tests {
             let x = (row % 13) as f32;
             (vec![x, 2.0 * x], vec![x])
         });
-        assert_eq!(
-            Ridge::fit(&data, 0.0),
-            Err(RidgeError::Singular { penalty: 0.0 })
-        );
+        assert_eq!(Ridge::fit(&data, 0.0), Err(RidgeError::Singular { penalty: 0.0 }));
         let ridge = Ridge::fit(&data, 1e-6).unwrap();
         assert!((ridge.weights[(0, 0)] - ridge.weights[(0, 1)]).abs() < 1e-6);
         assert!((ridge.evaluate(&[5.0, 10.0])[0] - 5.0).abs() < 1e-4);

@@ -61,9 +61,7 @@ impl Default for TrainingSettings {
             epochs: 200,
             batch: 256,
             learning_rate: 1e-3,
-            schedule: Schedule::Cosine {
-                final_fraction: 0.01,
-            },
+            schedule: Schedule::Cosine { final_fraction: 0.01 },
             beta1: 0.9,
             beta2: 0.999,
             epsilon: 1e-8,
@@ -133,9 +131,7 @@ pub struct FakeQuantisation {
 
 impl Default for FakeQuantisation {
     fn default() -> Self {
-        Self {
-            activation_bits: Some(16),
-        }
+        Self { activation_bits: Some(16) }
     }
 }
 
@@ -165,52 +161,18 @@ impl TrainingSettings {
                 }
             }
         };
-        let delta = if let Loss::Huber { delta } = self.loss {
-            delta
-        } else {
-            1.0
-        };
+        let delta = if let Loss::Huber { delta } = self.loss { delta } else { 1.0 };
         let weights_fit = self.output_weights.is_empty() || self.output_weights.len() == outputs;
-        let weights_usable = self
-            .output_weights
-            .iter()
-            .all(|weight| weight.is_finite() && *weight >= 0.0);
-        let bits = self
-            .quantisation
-            .and_then(|quantisation| quantisation.activation_bits);
+        let weights_usable = self.output_weights.iter().all(|weight| weight.is_finite() && *weight >= 0.0);
+        let bits = self.quantisation.and_then(|quantisation| quantisation.activation_bits);
         let text = |value: &dyn std::fmt::Debug| format!("{value:?}");
         let fraction = |value: f64| (0.0..1.0).contains(&value);
         let rules: [(bool, &'static str, &dyn std::fmt::Debug, &'static str); 14] = [
-            (
-                !self.hidden.contains(&0),
-                "hidden",
-                &self.hidden,
-                "widths are at least 1",
-            ),
-            (
-                self.ridge_penalty >= 0.0,
-                "ridge_penalty",
-                &self.ridge_penalty,
-                "use zero or more",
-            ),
-            (
-                self.initial_output_gain.is_finite(),
-                "initial_output_gain",
-                &self.initial_output_gain,
-                "use a number",
-            ),
-            (
-                delta > 0.0,
-                "loss.huber.delta",
-                &delta,
-                "use more than zero",
-            ),
-            (
-                weights_fit && weights_usable,
-                "output_weights",
-                &self.output_weights,
-                "use none, or one per output, none negative",
-            ),
+            (!self.hidden.contains(&0), "hidden", &self.hidden, "widths are at least 1"),
+            (self.ridge_penalty >= 0.0, "ridge_penalty", &self.ridge_penalty, "use zero or more"),
+            (self.initial_output_gain.is_finite(), "initial_output_gain", &self.initial_output_gain, "use a number"),
+            (delta > 0.0, "loss.huber.delta", &delta, "use more than zero"),
+            (weights_fit && weights_usable, "output_weights", &self.output_weights, "use none, or one per output, none negative"),
             (self.batch > 0, "batch", &self.batch, "use at least 1"),
             (
                 self.learning_rate > 0.0 && self.learning_rate.is_finite(),
@@ -218,55 +180,16 @@ impl TrainingSettings {
                 &self.learning_rate,
                 "use more than zero",
             ),
-            (
-                (0.0..=1.0).contains(&final_fraction),
-                "schedule",
-                &self.schedule,
-                "fractions are 0 to 1, epochs at least 1",
-            ),
-            (
-                fraction(self.beta1),
-                "beta1",
-                &self.beta1,
-                "use 0 to below 1",
-            ),
-            (
-                fraction(self.beta2),
-                "beta2",
-                &self.beta2,
-                "use 0 to below 1",
-            ),
-            (
-                self.epsilon > 0.0,
-                "epsilon",
-                &self.epsilon,
-                "use more than zero",
-            ),
-            (
-                self.weight_decay >= 0.0,
-                "weight_decay",
-                &self.weight_decay,
-                "use zero or more",
-            ),
-            (
-                self.gradient_clip.is_none_or(|clip| clip > 0.0),
-                "gradient_clip",
-                &self.gradient_clip,
-                "use more than zero",
-            ),
-            (
-                bits.is_none_or(|bits| (2..=24).contains(&bits)),
-                "quantisation.activation_bits",
-                &bits,
-                "use 2 to 24",
-            ),
+            ((0.0..=1.0).contains(&final_fraction), "schedule", &self.schedule, "fractions are 0 to 1, epochs at least 1"),
+            (fraction(self.beta1), "beta1", &self.beta1, "use 0 to below 1"),
+            (fraction(self.beta2), "beta2", &self.beta2, "use 0 to below 1"),
+            (self.epsilon > 0.0, "epsilon", &self.epsilon, "use more than zero"),
+            (self.weight_decay >= 0.0, "weight_decay", &self.weight_decay, "use zero or more"),
+            (self.gradient_clip.is_none_or(|clip| clip > 0.0), "gradient_clip", &self.gradient_clip, "use more than zero"),
+            (bits.is_none_or(|bits| (2..=24).contains(&bits)), "quantisation.activation_bits", &bits, "use 2 to 24"),
         ];
         match rules.iter().find(|(fits, ..)| !fits) {
-            Some((_, field, found, expected)) => Err(SettingsError {
-                field,
-                found: text(found),
-                expected,
-            }),
+            Some((_, field, found, expected)) => Err(SettingsError { field, found: text(found), expected }),
             None => Ok(()),
         }
     }
@@ -279,12 +202,9 @@ impl TrainingSettings {
                 let steps = (self.epochs * steps_per_epoch).max(2) - 1;
                 let angle = std::f64::consts::PI * (step.min(steps) as f64 / steps as f64);
                 // nalgebra's cosine is libm's on every machine, unlike the standard library's.
-                final_fraction
-                    + (1.0 - final_fraction) * 0.5 * (1.0 + nalgebra::ComplexField::cos(angle))
+                final_fraction + (1.0 - final_fraction) * 0.5 * (1.0 + nalgebra::ComplexField::cos(angle))
             }
-            Schedule::Step { epochs, factor } => {
-                (0..step / (epochs * steps_per_epoch)).fold(1.0, |rate, _| rate * factor)
-            }
+            Schedule::Step { epochs, factor } => (0..step / (epochs * steps_per_epoch)).fold(1.0, |rate, _| rate * factor),
         };
         self.learning_rate * factor
     }
@@ -296,57 +216,23 @@ mod tests {
 
     #[test]
     fn schedules_start_at_the_rate_and_fall() {
-        let rate = |schedule, step| {
-            TrainingSettings {
-                schedule,
-                epochs: 10,
-                ..Default::default()
-            }
-            .learning_rate_at(step, 5)
-        };
-        let cosine = Schedule::Cosine {
-            final_fraction: 0.1,
-        };
+        let rate = |schedule, step| TrainingSettings { schedule, epochs: 10, ..Default::default() }.learning_rate_at(step, 5);
+        let cosine = Schedule::Cosine { final_fraction: 0.1 };
         assert_eq!(rate(cosine, 0), 1e-3);
         assert!((rate(cosine, 49) - 1e-4).abs() < 1e-12 && rate(cosine, 20) > rate(cosine, 30));
-        let step = Schedule::Step {
-            epochs: 4,
-            factor: 0.5,
-        };
-        assert_eq!(
-            [rate(step, 19), rate(step, 20), rate(step, 40)],
-            [1e-3, 5e-4, 2.5e-4]
-        );
+        let step = Schedule::Step { epochs: 4, factor: 0.5 };
+        assert_eq!([rate(step, 19), rate(step, 20), rate(step, 40)], [1e-3, 5e-4, 2.5e-4]);
         assert_eq!(rate(Schedule::Constant, 49), 1e-3);
     }
 
     #[test]
     fn refuses_by_field_name() {
-        let settings = TrainingSettings {
-            beta2: 1.0,
-            ..Default::default()
-        };
-        assert_eq!(
-            settings.check(1).unwrap_err().to_string(),
-            "training setting `beta2` is 1.0; use 0 to below 1"
-        );
-        let settings = TrainingSettings {
-            output_weights: vec![1.0],
-            ..Default::default()
-        };
-        assert!(
-            settings.check(1).is_ok() && settings.check(2).unwrap_err().field == "output_weights"
-        );
-        assert!(
-            toml::from_str::<TrainingSettings>("epoch = 3")
-                .unwrap_err()
-                .to_string()
-                .contains("epoch")
-        );
+        let settings = TrainingSettings { beta2: 1.0, ..Default::default() };
+        assert_eq!(settings.check(1).unwrap_err().to_string(), "training setting `beta2` is 1.0; use 0 to below 1");
+        let settings = TrainingSettings { output_weights: vec![1.0], ..Default::default() };
+        assert!(settings.check(1).is_ok() && settings.check(2).unwrap_err().field == "output_weights");
+        assert!(toml::from_str::<TrainingSettings>("epoch = 3").unwrap_err().to_string().contains("epoch"));
         let text = toml::to_string(&TrainingSettings::default()).unwrap();
-        assert_eq!(
-            toml::from_str::<TrainingSettings>(&text).unwrap(),
-            TrainingSettings::default()
-        );
+        assert_eq!(toml::from_str::<TrainingSettings>(&text).unwrap(), TrainingSettings::default());
     }
 }

@@ -39,19 +39,11 @@ impl NetworkTrainer {
     ///
     /// The skip is trained if the settings say [`Skip::Joint`] and the network has one; otherwise it stays as it is.
     /// [`TrainingSettings::hidden`], `activation` and the initial values are settled by the network.
-    pub fn new(
-        network: &FloatNetwork,
-        settings: &TrainingSettings,
-        training: &Dataset,
-    ) -> Result<Self, TrainingError> {
+    pub fn new(network: &FloatNetwork, settings: &TrainingSettings, training: &Dataset) -> Result<Self, TrainingError> {
         network.check()?;
         settings.check(network.outputs())?;
         check_columns(network, training)?;
-        if network
-            .layers
-            .last()
-            .is_none_or(|layer| layer.activation != Activation::Linear)
-        {
+        if network.layers.last().is_none_or(|layer| layer.activation != Activation::Linear) {
             return Err(TrainingError::LastLayer);
         }
         let joint = settings.skip == Skip::Joint;
@@ -64,17 +56,11 @@ impl NetworkTrainer {
         });
         let mut layers = network.layers.clone();
         if let Some(last) = layers.last_mut() {
-            last.weights
-                .iter_mut()
-                .chain(&mut last.bias)
-                .for_each(|value| *value *= gain);
+            last.weights.iter_mut().chain(&mut last.bias).for_each(|value| *value *= gain);
         }
         let batch = settings.batch.min(training.rows());
         let mut trainer = Self {
-            settings: TrainingSettings {
-                batch,
-                ..settings.clone()
-            },
+            settings: TrainingSettings { batch, ..settings.clone() },
             frame: network.clone(),
             engine: Backpropagation::new(network.inputs(), &layers, skip, batch),
             targets: PaddedMatrix::zeros(batch, network.outputs()),
@@ -105,14 +91,8 @@ impl NetworkTrainer {
             self.engine.forward(rows);
             self.engine.raise_to_largest_inputs(rows, &mut largest);
         }
-        let ranges = |bits| {
-            largest
-                .iter()
-                .map(|largest| activation_range(*largest, bits))
-                .collect()
-        };
-        self.engine
-            .quantise(quantisation.activation_bits.map(ranges));
+        let ranges = |bits| largest.iter().map(|largest| activation_range(*largest, bits)).collect();
+        self.engine.quantise(quantisation.activation_bits.map(ranges));
     }
 
     /// Copies the rows `order[first..]` into the batch; returns how many there were.
@@ -120,9 +100,7 @@ impl NetworkTrainer {
         let last = (first + self.settings.batch).min(self.order.len());
         self.row_weights.clear();
         for (slot, row) in self.order[first..last].iter().enumerate() {
-            self.engine
-                .inputs
-                .copy_row(slot, &self.training.inputs, *row);
+            self.engine.inputs.copy_row(slot, &self.training.inputs, *row);
             self.targets.copy_row(slot, &self.training.targets, *row);
             self.row_weights.push(self.training.row_weights[*row]);
         }
@@ -133,9 +111,7 @@ impl NetworkTrainer {
     fn scaled_loss(&self) -> Loss {
         match self.settings.loss {
             Loss::MeanSquare => Loss::MeanSquare,
-            Loss::Huber { delta } => Loss::Huber {
-                delta: delta * self.gain,
-            },
+            Loss::Huber { delta } => Loss::Huber { delta: delta * self.gain },
         }
     }
 
@@ -153,9 +129,7 @@ impl NetworkTrainer {
         self.powers.0 *= settings.beta1;
         self.powers.1 *= settings.beta2;
         self.steps += 1;
-        let gradient_factor = settings
-            .gradient_clip
-            .map_or(1.0, |clip| (clip / self.engine.gradient_norm()).min(1.0));
+        let gradient_factor = settings.gradient_clip.map_or(1.0, |clip| (clip / self.engine.gradient_norm()).min(1.0));
         self.engine.update(AdamFactors {
             beta1: settings.beta1 as f32,
             beta2: settings.beta2 as f32,
@@ -173,13 +147,7 @@ impl NetworkTrainer {
         let loss = self.scaled_loss();
         let factor = 1.0 / (rows * self.output_weights.len()) as f32;
         let output = self.engine.forward(rows);
-        let total = loss.replace_by_gradient(
-            output,
-            &self.targets,
-            &self.row_weights,
-            &self.output_weights,
-            factor,
-        );
+        let total = loss.replace_by_gradient(output, &self.targets, &self.row_weights, &self.output_weights, factor);
         self.engine.backward(rows);
         total
     }
@@ -221,13 +189,7 @@ impl NetworkTrainer {
             }
             let row_weights = &set.row_weights[first..first + rows];
             let output = self.engine.forward(rows);
-            total += loss.replace_by_gradient(
-                output,
-                &self.targets,
-                row_weights,
-                &self.output_weights,
-                0.0,
-            );
+            total += loss.replace_by_gradient(output, &self.targets, row_weights, &self.output_weights, 0.0);
         }
         total * self.mean_factor(set.rows())
     }
@@ -247,8 +209,7 @@ impl NetworkTrainer {
             layer.weights = trained.weights.to_rows_of_outputs();
             layer.bias = trained.bias.value.row(0).to_vec();
         }
-        let divide =
-            |values: &mut Vec<f32>| values.iter_mut().for_each(|value| *value /= self.gain);
+        let divide = |values: &mut Vec<f32>| values.iter_mut().for_each(|value| *value /= self.gain);
         if let Some(last) = network.layers.last_mut() {
             divide(&mut last.weights);
             divide(&mut last.bias);
@@ -264,19 +225,9 @@ impl NetworkTrainer {
 
 /// Whether the data has the network's columns.
 pub(super) fn check_columns(network: &FloatNetwork, data: &Dataset) -> Result<(), TrainingError> {
-    let pairs = [
-        ("inputs", data.inputs().columns(), network.inputs()),
-        ("labels", data.labels().columns(), network.outputs()),
-    ];
-    match pairs
-        .into_iter()
-        .find(|(_, found, expected)| found != expected)
-    {
-        Some((what, found, expected)) => Err(TrainingError::Columns {
-            what,
-            found,
-            expected,
-        }),
+    let pairs = [("inputs", data.inputs().columns(), network.inputs()), ("labels", data.labels().columns(), network.outputs())];
+    match pairs.into_iter().find(|(_, found, expected)| found != expected) {
+        Some((what, found, expected)) => Err(TrainingError::Columns { what, found, expected }),
         None => Ok(()),
     }
 }

@@ -106,10 +106,7 @@ impl Transverse {
     fn advance(&mut self, random: &mut Xoshiro256PlusPlus) {
         let ([x, y], [first, mixed, second]) = (self.state, self.factor);
         let (a, b) = (normal(random), normal(random));
-        self.state = [
-            self.decay * x + first * a,
-            self.decay * (self.ratio * x + y) + mixed * a + second * b,
-        ];
+        self.state = [self.decay * x + first * a, self.decay * (self.ratio * x + y) + mixed * a + second * b];
     }
 
     fn value(&self) -> f64 {
@@ -131,23 +128,12 @@ pub(super) struct Gusts {
 }
 
 impl Gusts {
-    pub(super) fn new(
-        settings: &Dryden,
-        mean_wind: [f64; 3],
-        tick: f64,
-        mut random: Xoshiro256PlusPlus,
-    ) -> Self {
-        let [horizontal, vertical] = settings
-            .scale_lengths()
-            .map(|length| tick * settings.airspeed / length);
+    pub(super) fn new(settings: &Dryden, mean_wind: [f64; 3], tick: f64, mut random: Xoshiro256PlusPlus) -> Self {
+        let [horizontal, vertical] = settings.scale_lengths().map(|length| tick * settings.airspeed / length);
         let [x, y, _] = mean_wind;
         let speed = (x * x + y * y).sqrt();
         Self {
-            direction: if speed > 0.0 {
-                [x / speed, y / speed]
-            } else {
-                [1.0, 0.0]
-            },
+            direction: if speed > 0.0 { [x / speed, y / speed] } else { [1.0, 0.0] },
             intensities: settings.intensities(),
             along: Longitudinal {
                 decay: libm::exp(-horizontal),
@@ -164,15 +150,8 @@ impl Gusts {
     pub(super) fn value(&self) -> [f64; 3] {
         let [horizontal, vertical] = self.intensities;
         let [cosine, sine] = self.direction;
-        let (u, v) = (
-            horizontal * self.along.state,
-            horizontal * self.across.value(),
-        );
-        [
-            cosine * u - sine * v,
-            sine * u + cosine * v,
-            vertical * self.vertical.value(),
-        ]
+        let (u, v) = (horizontal * self.along.state, horizontal * self.across.value());
+        [cosine * u - sine * v, sine * u + cosine * v, vertical * self.vertical.value()]
     }
 
     pub(super) fn advance(&mut self) {
@@ -193,28 +172,18 @@ mod tests {
 
     use super::*;
 
-    const SETTINGS: Dryden = Dryden {
-        wind_at_6_m: 7.7,
-        altitude: 6.096,
-        airspeed: 5.0,
-    };
+    const SETTINGS: Dryden = Dryden { wind_at_6_m: 7.7, altitude: 6.096, airspeed: 5.0 };
 
     #[test]
     fn scales_and_intensities_are_the_standards() {
         // 20 feet: 0.177 + 0.000823 * 20 = 0.19346.
         let [horizontal, vertical] = SETTINGS.scale_lengths();
-        assert!(
-            (horizontal / METRES_PER_FOOT - 143.56).abs() < 0.05,
-            "{horizontal}"
-        );
+        assert!((horizontal / METRES_PER_FOOT - 143.56).abs() < 0.05, "{horizontal}");
         assert!((vertical - 6.096).abs() < 1e-9);
         let [horizontal, vertical] = SETTINGS.intensities();
         assert!((vertical - 0.77).abs() < 1e-12);
         assert!((horizontal / vertical - 1.929).abs() < 1e-3, "{horizontal}");
-        let low = Dryden {
-            altitude: 1.0,
-            ..SETTINGS
-        };
+        let low = Dryden { altitude: 1.0, ..SETTINGS };
         assert!((low.scale_lengths()[1] - 10.0 * METRES_PER_FOOT).abs() < 1e-12);
     }
 
@@ -236,26 +205,14 @@ mod tests {
             let ratio = vertical / horizontal;
             let [wide, high] = SETTINGS.intensities();
             // The mean wind blows to -y: along is y, across is x.
-            let expected = [
-                (wide, (-ratio).exp() * (1.0 - 0.5 * ratio)),
-                (wide, (-ratio).exp()),
-                (high, (-1.0_f64).exp() * 0.5),
-            ];
+            let expected = [(wide, (-ratio).exp() * (1.0 - 0.5 * ratio)), (wide, (-ratio).exp()), (high, (-1.0_f64).exp() * 0.5)];
             for (axis, (sigma, correlation)) in expected.into_iter().enumerate() {
-                let variance = values.iter().map(|value| value[axis].powi(2)).sum::<f64>()
-                    / values.len() as f64;
-                assert!(
-                    (variance / (sigma * sigma) - 1.0).abs() < 0.06,
-                    "{axis} {variance}"
-                );
+                let variance = values.iter().map(|value| value[axis].powi(2)).sum::<f64>() / values.len() as f64;
+                assert!((variance / (sigma * sigma) - 1.0).abs() < 0.06, "{axis} {variance}");
                 let pairs = values.iter().zip(&values[lag..]);
-                let covariance = pairs.map(|(a, b)| a[axis] * b[axis]).sum::<f64>()
-                    / (values.len() - lag) as f64;
+                let covariance = pairs.map(|(a, b)| a[axis] * b[axis]).sum::<f64>() / (values.len() - lag) as f64;
                 let found = covariance / variance;
-                assert!(
-                    (found - correlation).abs() < 0.03,
-                    "{axis} {found} {correlation}"
-                );
+                assert!((found - correlation).abs() < 0.03, "{axis} {found} {correlation}");
             }
         }
     }

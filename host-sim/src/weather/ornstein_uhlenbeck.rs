@@ -20,10 +20,7 @@ pub struct OrnsteinUhlenbeck {
 impl Default for OrnsteinUhlenbeck {
     /// Nothing.
     fn default() -> Self {
-        Self {
-            sigma: [0.0; 3],
-            correlation_time: 1.0,
-        }
+        Self { sigma: [0.0; 3], correlation_time: 1.0 }
     }
 }
 
@@ -34,17 +31,10 @@ impl OrnsteinUhlenbeck {
     }
 
     pub(super) fn check(&self, field: &'static str) -> Result<(), WeatherError> {
-        let sigma = self
-            .sigma
-            .iter()
-            .all(|value| value.is_finite() && *value >= 0.0);
+        let sigma = self.sigma.iter().all(|value| value.is_finite() && *value >= 0.0);
         require(sigma, field, "of finite sigma, zero or positive")?;
         let time = self.correlation_time;
-        require(
-            time.is_finite() && time > 0.0,
-            field,
-            "of positive correlation_time (s)",
-        )
+        require(time.is_finite() && time > 0.0, field, "of positive correlation_time (s)")
     }
 }
 
@@ -59,19 +49,13 @@ pub(super) struct Process {
 }
 
 impl Process {
-    pub(super) fn new(
-        settings: &OrnsteinUhlenbeck,
-        tick: f64,
-        mut random: Xoshiro256PlusPlus,
-    ) -> Self {
+    pub(super) fn new(settings: &OrnsteinUhlenbeck, tick: f64, mut random: Xoshiro256PlusPlus) -> Self {
         let ratio = tick / settings.correlation_time;
         let spread = (-libm::expm1(-2.0 * ratio)).sqrt();
         Self {
             decay: libm::exp(-ratio),
             gain: settings.sigma.map(|sigma| sigma * spread),
-            value: settings
-                .sigma
-                .map(|sigma| scaled_normal(sigma, &mut random)),
+            value: settings.sigma.map(|sigma| scaled_normal(sigma, &mut random)),
             random,
         }
     }
@@ -89,11 +73,7 @@ impl Process {
 
 /// A normal number of that standard deviation; nothing is drawn for zero.
 fn scaled_normal(sigma: f64, random: &mut Xoshiro256PlusPlus) -> f64 {
-    if sigma == 0.0 {
-        0.0
-    } else {
-        sigma * random.sample::<f64, _>(StandardNormal)
-    }
+    if sigma == 0.0 { 0.0 } else { sigma * random.sample::<f64, _>(StandardNormal) }
 }
 
 #[cfg(test)]
@@ -103,10 +83,7 @@ mod tests {
     use super::*;
 
     fn process(tick: f64, seed: u64) -> Process {
-        let settings = OrnsteinUhlenbeck {
-            sigma: [0.12, 0.0, 2.0],
-            correlation_time: 0.4,
-        };
+        let settings = OrnsteinUhlenbeck { sigma: [0.12, 0.0, 2.0], correlation_time: 0.4 };
         Process::new(&settings, tick, Xoshiro256PlusPlus::seed_from_u64(seed))
     }
 
@@ -124,18 +101,11 @@ mod tests {
             for (axis, sigma) in [(0, 0.12), (2, 2.0)] {
                 let count = (values.len() - lag) as f64;
                 let pairs = values.iter().zip(&values[lag..]);
-                let variance = values.iter().map(|value| value[axis].powi(2)).sum::<f64>()
-                    / values.len() as f64;
+                let variance = values.iter().map(|value| value[axis].powi(2)).sum::<f64>() / values.len() as f64;
                 let covariance = pairs.map(|(a, b)| a[axis] * b[axis]).sum::<f64>() / count;
-                assert!(
-                    (variance / (sigma * sigma) - 1.0).abs() < 0.06,
-                    "{variance}"
-                );
+                assert!((variance / (sigma * sigma) - 1.0).abs() < 0.06, "{variance}");
                 let correlation = covariance / variance;
-                assert!(
-                    (correlation - (-1.0_f64).exp()).abs() < 0.04,
-                    "{correlation}"
-                );
+                assert!((correlation - (-1.0_f64).exp()).abs() < 0.04, "{correlation}");
             }
             assert!(values.iter().all(|value| value[1] == 0.0));
         }

@@ -1,0 +1,99 @@
+//! The flights of an experiment: one vehicle with its gains under one condition.
+
+use impromptu_firmware::{adapter::Lanes, flight::Settings, model::Model};
+
+use crate::{
+    condition::Condition,
+    flight_log::FlightLog,
+    plant::Vehicle,
+    rollout::{self, Dither, FlightPlan, FlightRecord, RolloutError},
+    trajectory::{Motion, Trajectory, TrajectoryError},
+};
+
+/// Why flights were not flown.
+#[derive(Debug, thiserror::Error)]
+pub enum FlightsError {
+    /// A trajectory cannot be sampled.
+    #[error(transparent)]
+    Trajectory(#[from] TrajectoryError),
+    /// The rollout refuses.
+    #[error(transparent)]
+    Rollout(#[from] RolloutError),
+}
+
+/// A vehicle, its gains and what it meets.
+#[derive(Clone, Debug)]
+pub struct Loop {
+    /// Vehicle.
+    pub vehicle: Vehicle,
+    /// Name of the position gains.
+    pub gains: String,
+    /// Settings of the flight stack.
+    pub settings: Settings,
+    /// Condition.
+    pub condition: Condition,
+}
+
+impl Loop {
+    /// A vehicle with the gains of that name.
+    ///
+    /// # Errors
+    /// If the vehicle has no such gains.
+    pub fn new(vehicle: Vehicle, gains: &str, condition: Condition) -> Result<Self, RolloutError> {
+        Ok(Self { settings: rollout::settings(&vehicle, gains)?, vehicle, gains: gains.into(), condition })
+    }
+
+    /// Rate of the references, Hz.
+    pub fn rate_hz(&self) -> f64 {
+        f64::from(self.settings.rates.reference_hz())
+    }
+
+    /// Flies plans under this loop's condition.
+    ///
+    /// # Errors
+    /// The first plan that cannot be flown.
+    pub fn fly(&self, plans: &[FlightPlan<'_>]) -> Result<Vec<FlightRecord>, RolloutError> {
+        rollout::fly(&self.vehicle, &self.settings, &self.condition, plans)
+    }
+
+    /// Logs of the baseline over motions, with a dither on the position reference if given.
+    ///
+    /// # Errors
+    /// If a motion cannot be sampled or flown.
+    pub fn collect(&self, motions: &[Motion], dither: Option<Dither>, seed: u64) -> Result<Vec<FlightLog>, FlightsError> {
+        let trajectories: Vec<Trajectory> =
+            motions.iter().map(|motion| motion.sampled(self.rate_hz())).collect::<Result<_, _>>()?;
+        let plans: Vec<FlightPlan<'_>> = trajectories
+            .iter()
+            .zip(seed..)
+            .map(|(trajectory, seed)| FlightPlan { dither, log: true, ..FlightPlan::new(trajectory, seed) })
+            .collect();
+        Ok(self.fly(&plans)?.into_iter().filter_map(|record| record.log).collect())
+    }
+
+    /// RMS errors, m, over trajectories with a model, at a loop gain of the feedback lane.
+    ///
+    /// # Errors
+    /// If the model does not fit the flight stack.
+    pub fn errors(
+        &self,
+        trajectories: &[Trajectory],
+        model: Option<(&Model<'_>, Lanes)>,
+        loop_gain: f32,
+        seed: u64,
+    ) -> Result<Vec<f64>, RolloutError> {
+        let plans: Vec<FlightPlan<'_>> = trajectories
+            .iter()
+            .zip(seed..)
+            .map(|(trajectory, seed)| FlightPlan { model, loop_gain, ..FlightPlan::new(trajectory, seed) })
+            .collect();
+        Ok(self.fly(&plans)?.into_iter().map(|record| record.rms).collect())
+    }
+}
+
+/// Reduction of errors against the baseline's, in per cent: mean and worst over the flights.
+pub fn reduction(baseline: &[f64], errors: &[f64]) -> (f64, f64) {
+    let reductions = baseline.iter().zip(errors).map(|(baseline, error)| 100.0 * (1.0 - error / baseline));
+    let worst = reductions.clone().fold(f64::INFINITY, f64::min);
+    (reductions.sum::<f64>() / baseline.len().max(1) as f64, worst)
+}

@@ -1,0 +1,16 @@
+//! Experiments: collect flights, learn, design the feedback lane, export, fly, compare.
+//!
+//! *in* a [`Recipe`] and a [`Loop`]; *out* models and [`crate::report::Results`]; *never* a choice made on the test flights;
+//! *source* Zhou 2017, section V; Li 2017 (30 unseen strokes).
+
+mod flights;
+mod lane;
+mod learn;
+mod models;
+mod recipe;
+
+pub use flights::{FlightsError, Loop, reduction};
+pub use lane::{LaneChoice, LaneRefusal, choose_lane, dithered_logs};
+pub use learn::{LearnError, Learned, learn};
+pub use models::{ModelSet, describe, feedforward};
+pub use recipe::{Excitation, LaneRecipe, Recipe, Signal};

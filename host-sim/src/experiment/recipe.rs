@@ -1,0 +1,201 @@
+//! Everything that decides how a model comes about, as data with sourced defaults.
+
+use impromptu_firmware::{
+    features::{Feature, window},
+    model::Interpolation,
+};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    feedback_design::DesignSettings,
+    training::{FakeQuantisation, TrainingSettings},
+    trajectory::{Motion, MultisineSettings, STROKE_SPEED, SplineSettings, multisine, random_spline, stroke},
+};
+
+/// Form of a training flight.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Signal {
+    /// Twelve tones an axis.
+    Multisine,
+    /// A spline through random points.
+    Spline,
+    /// Strokes like the test's, of other seeds, one after another.
+    Strokes,
+}
+
+/// Training flights of one kind.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Excitation {
+    /// Form.
+    pub signal: Signal,
+    /// Number of flights, each with its own seed.
+    pub flights: u32,
+    /// Length of each, s.
+    pub seconds: f64,
+    /// Peak speed, m/s.
+    pub max_speed: f64,
+    /// Peak acceleration, m/s².
+    pub max_acceleration: f64,
+    /// Shortest period of a multisine, time between the points of a spline, s.
+    pub shortest_s: f64,
+}
+
+impl Excitation {
+    /// The motions to be flown, from `seed` on.
+    pub fn motions(&self, seed: u64) -> Vec<Motion> {
+        let Self { max_speed, max_acceleration, seconds, shortest_s, .. } = *self;
+        (0..u64::from(self.flights))
+            .map(|index| {
+                let seed = seed.wrapping_add(index);
+                match self.signal {
+                    Signal::Multisine => multisine(
+                        seed,
+                        seconds,
+                        &MultisineSettings {
+                            max_speed,
+                            max_acceleration,
+                            periods: [shortest_s, 20.0],
+                            ..MultisineSettings::default()
+                        },
+                    ),
+                    Signal::Spline => random_spline(
+                        seed,
+                        seconds,
+                        &SplineSettings { max_speed, max_acceleration, interval: shortest_s, ..SplineSettings::default() },
+                    ),
+                    Signal::Strokes => stroke(seed, 0).scaled(max_speed / STROKE_SPEED),
+                }
+            })
+            .collect()
+    }
+}
+
+/// How the feedback lane is designed and chosen.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LaneRecipe {
+    /// Flights with dither.
+    pub excitation: Excitation,
+    /// Amplitude of the dither, m.
+    pub dither: f64,
+    /// Time between new signs of the dither, s.
+    pub dither_hold_s: f64,
+    /// Efforts tried.
+    pub efforts: Vec<f64>,
+    /// Weights on the velocity error tried, s².
+    pub velocity_weights: Vec<f64>,
+    /// Noise inflations tried.
+    pub noise_factors: Vec<f64>,
+    /// Clamps of the fast part tried, m.
+    pub fast_limits: Vec<f64>,
+    /// Clamp of the integral part, m.
+    pub integral_limit: f64,
+    /// Everything else of the design.
+    pub design: DesignSettings,
+}
+
+impl Default for LaneRecipe {
+    fn default() -> Self {
+        Self {
+            excitation: Excitation {
+                signal: Signal::Multisine,
+                flights: 4,
+                seconds: 90.0,
+                max_speed: 1.5,
+                max_acceleration: 5.0,
+                shortest_s: 0.5,
+            },
+            dither: 0.01,
+            dither_hold_s: 0.05,
+            efforts: vec![6e-3, 1.2e-2, 3e-2],
+            velocity_weights: vec![0.05, 0.2],
+            noise_factors: vec![2.0, 4.0],
+            fast_limits: vec![0.05, 0.1, 0.15],
+            integral_limit: 0.3,
+            design: DesignSettings::default(),
+        }
+    }
+}
+
+/// The recipe of a model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Recipe {
+    /// First and last offset of the window of desired positions, in sub-rate ticks.
+    pub window: [i16; 2],
+    /// Distance between the offsets of the window, in sub-rate ticks.
+    pub window_step: i16,
+    /// Reference ticks in a sub-rate tick.
+    pub divisor: u16,
+    /// Held or ramped between sub-rate ticks.
+    pub interpolation: Interpolation,
+    /// Time in which a lane fades in or out, s.
+    pub fade_s: f64,
+    /// Zero-phase smoothing of logs with noise, s.
+    pub smoothing_s: f64,
+    /// Every how many reference ticks a training row is taken.
+    pub stride: usize,
+    /// Training flights.
+    pub excitations: Vec<Excitation>,
+    /// Penalty of the ridge regression.
+    pub ridge_penalty: f64,
+    /// Training of the network on what the ridge regression leaves.
+    pub network: TrainingSettings,
+    /// Fine-tuning with int8 weights imitated.
+    pub fine_tuning: TrainingSettings,
+    /// Feedback lane.
+    pub lane: LaneRecipe,
+    /// Strokes of the validation set (a seed of their own, never those of the test).
+    pub validation_strokes: usize,
+    /// Speeds at which they are flown.
+    pub validation_speeds: Vec<f64>,
+}
+
+impl Default for Recipe {
+    fn default() -> Self {
+        let excitation = |signal, max_speed, max_acceleration| Excitation {
+            signal,
+            flights: 2,
+            seconds: 90.0,
+            max_speed,
+            max_acceleration,
+            shortest_s: 0.7,
+        };
+        Self {
+            window: [-4, 8],
+            window_step: 1,
+            divisor: 10,
+            interpolation: Interpolation::Linear,
+            fade_s: 0.5,
+            smoothing_s: 0.06,
+            stride: 2,
+            excitations: vec![
+                excitation(Signal::Multisine, 1.7, 4.5),
+                excitation(Signal::Multisine, 2.4, 13.0),
+                excitation(Signal::Spline, 1.7, 4.5),
+                excitation(Signal::Spline, 2.4, 13.0),
+            ],
+            ridge_penalty: 1e-6,
+            network: TrainingSettings { epochs: 60, learning_rate: 2e-3, ..TrainingSettings::default() },
+            fine_tuning: TrainingSettings {
+                epochs: 10,
+                learning_rate: 2e-4,
+                quantisation: Some(FakeQuantisation::default()),
+                ..TrainingSettings::default()
+            },
+            lane: LaneRecipe::default(),
+            validation_strokes: 8,
+            validation_speeds: vec![1.0, 1.7],
+        }
+    }
+}
+
+impl Recipe {
+    /// The network's inputs: desired positions over the window, relative to the present one.
+    pub fn features(&self) -> Vec<Feature> {
+        let step = self.window_step.max(1);
+        window(&[0, 1, 2], self.window[0]..=self.window[1]).filter(|feature| feature.offset % step == 0).collect()
+    }
+}
