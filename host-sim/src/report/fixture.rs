@@ -208,18 +208,18 @@ fn trace(
     desired: &[[f64; 3]],
 ) -> FlightTrace {
     let baseline = method == Method::Baseline;
-    let (lag, ahead, noise) = if baseline {
-        (16, 0, 0.002)
-    } else {
-        (0, 18, 0.002)
-    };
-    let mut wander = [0.0; 3];
-    let flown = (0..desired.len())
-        .map(|i| {
+    // A loop of 12 rad/s lags and cuts corners; the reference that undoes this runs ahead of it.
+    let (bandwidth, ahead) = if baseline { (0.12, 0) } else { (1.0, 18) };
+    let (mut wander, mut smooth, mut late) = ([0.0; 3], desired[0], desired[0]);
+    let flown = desired
+        .iter()
+        .map(|point| {
             std::array::from_fn(|axis| {
                 let deviate: f64 = StandardNormal.sample(random);
-                wander[axis] = 0.97 * wander[axis] + 0.25 * noise * deviate;
-                desired[i.saturating_sub(lag)][axis] + wander[axis]
+                wander[axis] = 0.97 * wander[axis] + 5e-4 * deviate;
+                smooth[axis] += bandwidth * (point[axis] - smooth[axis]);
+                late[axis] += bandwidth * (smooth[axis] - late[axis]);
+                late[axis] + wander[axis]
             })
         })
         .collect();

@@ -24,7 +24,7 @@ pub fn console_table(results: &Results) -> String {
         .load_style(presets::UTF8_HORIZONTAL_ONLY)
         .set_content_arrangement(ContentArrangement::Disabled)
         .set_header(
-            std::iter::once(Cell::new("vehicle, gains\ncondition, speed")).chain(
+            std::iter::once(Cell::new("vehicle; gains,\ncondition, speed")).chain(
                 methods
                     .iter()
                     .map(|method| right(method.heading().join("\n").trim_end())),
@@ -32,7 +32,7 @@ pub fn console_table(results: &Results) -> String {
         );
     for case in &cases {
         let mut name = format!(
-            "{} {}\n{} {}",
+            "{}\n{} {} {}",
             case.vehicle,
             case.gains,
             case.condition,
@@ -78,11 +78,11 @@ fn legend(results: &Results, cases: &[Case<'_>]) -> String {
     );
     let mut text = format!(
         "\
-Each cell, {flights}: mean RMS position error in cm; below it the reduction of that error in %, mean/worst flight.
-  RMS of one flight = sqrt(mean |desired - flown|^2) over the scored part, true position, three axes together.
-  Reduction of one flight = 100 (1 - RMS / RMS of the baseline over the same trajectory); below 0 it is worse than the baseline.
-  flatness: desired acceleration / kp added to the reference.  lane: feedback lane.  net: network lane.  ridge: linear, same features.
-  Last column = what is flashed. Speed multiplies the drawn speed; +20ms: 20 ms more delay in the whole loop at test time only.
+Each cell, {flights}: mean RMS position error in cm; below it its reduction in %, mean/worst flight.
+  RMS of one flight = sqrt(mean |desired - flown|^2) over the scored part: true position, three axes together.
+  Reduction of one flight = 100 (1 - RMS / baseline's RMS on the same trajectory); below 0 it is worse than the baseline.
+  flatness: desired acceleration / kp added to the reference. lane: feedback lane. net: network lane. ridge: linear, same features.
+  net int8 + lane is what is flashed. 1.7x: times the drawn speed. +20ms: 20 ms more delay in the whole loop, at test time only.
 "
     );
     let _ = writeln!(
@@ -102,6 +102,20 @@ mod tests {
     fn small_table_is_printed_as_agreed() {
         let text = console_table(&fixture::small());
         let expected = "\
+Two flights
+─────────────────────────────────────────────────────────────
+vehicle; gains,   baseline    flatness   net int8   net int8
+condition, speed                                      + lane
+═════════════════════════════════════════════════════════════
+crazyflie          11.2 cm     9.50 cm    1.25 cm    0.35 cm
+stock lab 1x                20.0/-20.0  89.0/88.0  97.0/96.0
+─────────────────────────────────────────────────────────────
+Each cell, over 2 flights of unseen trajectories: mean RMS position error in cm; below it its reduction in %, mean/worst flight.
+  RMS of one flight = sqrt(mean |desired - flown|^2) over the scored part: true position, three axes together.
+  Reduction of one flight = 100 (1 - RMS / baseline's RMS on the same trajectory); below 0 it is worse than the baseline.
+  flatness: desired acceleration / kp added to the reference. lane: feedback lane. net: network lane. ridge: linear, same features.
+  net int8 + lane is what is flashed. 1.7x: times the drawn speed. +20ms: 20 ms more delay in the whole loop, at test time only.
+Seed 7, version 0.1.0. Again: host-sim --seed 7
 ";
         assert_eq!(text, expected, "got:\n{text}");
     }
