@@ -42,7 +42,7 @@ pub(super) fn sections(
     Ok(html! {
         (section("Which part does what", html! {
             p { "Reduction of the error by method: the mean over all flights, and how far the worst flight falls behind it. "
-                "Reductions below 0 % are drawn at 0; the figures at the right are mean / worst." }
+                "The scale is logarithmic in the error that is left, as reductions crowd near 100 %; below 0 % they are drawn at 0. The figures at the right are mean / worst." }
             ul.legend {
                 (key("dot comparison", "mean")) (key("ring comparison", "worst flight"))
                 (key("comparison", "not learned, or feedback alone")) (key("ridge", "ridge, linear"))

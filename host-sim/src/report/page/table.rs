@@ -24,7 +24,7 @@ pub(super) fn section(cases: &[Case<'_>], methods: &[Method], flights: Option<&s
                             @for method in methods {
                                 th scope="col" class=[flashed(*method)] {
                                     (method.heading()[0])
-                                    @if !method.heading()[1].is_empty() { " " (method.heading()[1]) }
+                                    @if !method.heading()[1].is_empty() { " " span { (method.heading()[1]) } }
                                 }
                             }
                         } }

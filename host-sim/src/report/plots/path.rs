@@ -85,7 +85,7 @@ pub(in crate::report) fn path_in_space(scene: &Scene<'_>) -> anyhow::Result<Opti
         let mut chart = axes(area, x, y, &view.labels())?;
         curve(&mut chart, &desired, Ink::Desired.line(5.0))?;
         if let Some(points) = &baseline {
-            curve(&mut chart, points, Ink::Baseline.line(1.4))?;
+            curve(&mut chart, points, Ink::Baseline.line(1.8))?;
         }
         if let Some(points) = &add_on {
             curve(&mut chart, points, Ink::BothLanes.line(1.4))?;
