@@ -65,33 +65,18 @@ pub(super) fn full() -> Results {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(7);
     let mut per_flight = Vec::new();
     for (vehicle, penalty) in [("crazyflie", 1.0), ("crazyflie_brushless", 1.3)] {
-        for (condition, floor_cm) in [
-            ("clean", 0.04),
-            ("lab", 0.25),
-            ("rough", 0.6),
-            ("lab+20ms", 0.4),
-        ] {
+        for (condition, floor_cm) in [("clean", 0.04), ("lab", 0.25), ("rough", 0.6), ("lab+20ms", 0.4)] {
             for speed in [1.0, 1.35, 1.7] {
                 for stroke in 0..30 {
                     let baseline = 11.0 * speed * log_normal(&mut random, 0.15);
                     for method in Method::ALL {
-                        let share =
-                            remaining(method) * penalty * speed * log_normal(&mut random, 0.3);
-                        let rms_cm = if method == Method::Baseline {
-                            baseline
-                        } else {
-                            (baseline * share).hypot(floor_cm)
-                        };
+                        let share = remaining(method) * penalty * speed * log_normal(&mut random, 0.3);
+                        let rms_cm = if method == Method::Baseline { baseline } else { (baseline * share).hypot(floor_cm) };
                         per_flight.push(PerFlight {
                             vehicle: vehicle.to_owned(),
                             condition: condition.to_owned(),
                             speed,
-                            ..flight(
-                                method,
-                                &format!("stroke {stroke}"),
-                                rms_cm,
-                                100.0 * (1.0 - rms_cm / baseline),
-                            )
+                            ..flight(method, &format!("stroke {stroke}"), rms_cm, 100.0 * (1.0 - rms_cm / baseline))
                         });
                     }
                 }
@@ -113,18 +98,11 @@ pub(super) fn full() -> Results {
         per_flight,
         flights,
         models: ["clean", "lab", "rough"].map(card).into(),
-        timings: [
-            ("collect", 4.2),
-            ("train", 61.8),
-            ("design of the lane", 9.4),
-            ("evaluate", 38.25),
-        ]
-        .map(|(stage, seconds)| (stage.to_owned(), seconds))
-        .into(),
+        timings: [("collect", 4.2), ("train", 61.8), ("design of the lane", 9.4), ("evaluate", 38.25)]
+            .map(|(stage, seconds)| (stage.to_owned(), seconds))
+            .into(),
         conditions: Vec::new(),
-        notes: vec![
-            "Every number on this page is invented: it is the test of the page itself.".to_owned(),
-        ],
+        notes: vec!["Every number on this page is invented: it is the test of the page itself.".to_owned()],
     }
 }
 
@@ -139,15 +117,9 @@ fn card(condition: &str) -> ModelCard {
         crc32: 0x0bad_cafe,
         parameters: 21_430,
         multiply_adds: 20_992,
-        margins: (!refused).then_some(Margins {
-            delay_ms: 38.4,
-            gain: 2.41,
-            modulus: 0.52,
-        }),
+        margins: (!refused).then_some(Margins { delay_ms: 38.4, gain: 2.41, modulus: 0.52 }),
         lane: if refused {
-            LaneOutcome::Refused(
-                "the logs carry no independent dither on the position reference".to_owned(),
-            )
+            LaneOutcome::Refused("the logs carry no independent dither on the position reference".to_owned())
         } else {
             LaneOutcome::Chosen("effort 3e-3, e_v 0.05 s², noise x1, fast clamp 0.05 m".to_owned())
         },
@@ -180,11 +152,7 @@ fn stroke_path(random: &mut Xoshiro256PlusPlus, in_space: bool) -> Vec<[f64; 3]>
     for axis in 0..3 {
         for harmonic in 0..4 {
             let planar = axis != 1 || in_space;
-            amplitude[axis][harmonic] = if planar {
-                random.random_range(0.2..0.9) / (harmonic as f64 + 1.0)
-            } else {
-                0.0
-            };
+            amplitude[axis][harmonic] = if planar { random.random_range(0.2..0.9) / (harmonic as f64 + 1.0) } else { 0.0 };
             phase[axis][harmonic] = random.random_range(0.0..std::f64::consts::TAU);
         }
     }
@@ -193,20 +161,13 @@ fn stroke_path(random: &mut Xoshiro256PlusPlus, in_space: bool) -> Vec<[f64; 3]>
             let turn = (f64::from(i) - 150.0).clamp(0.0, 900.0) / 900.0 * std::f64::consts::TAU;
             std::array::from_fn(|axis| {
                 let height = if axis == 2 { 1.5 } else { 0.0 };
-                (0..4).fold(height, |sum, k| {
-                    sum + amplitude[axis][k] * (turn * (k + 1) as f64 + phase[axis][k]).sin()
-                })
+                (0..4).fold(height, |sum, k| sum + amplitude[axis][k] * (turn * (k + 1) as f64 + phase[axis][k]).sin())
             })
         })
         .collect()
 }
 
-fn trace(
-    random: &mut Xoshiro256PlusPlus,
-    stroke: usize,
-    method: Method,
-    desired: &[[f64; 3]],
-) -> FlightTrace {
+fn trace(random: &mut Xoshiro256PlusPlus, stroke: usize, method: Method, desired: &[[f64; 3]]) -> FlightTrace {
     let baseline = method == Method::Baseline;
     // A loop of 12 rad/s lags and cuts corners; the reference that undoes this runs ahead of it.
     let (bandwidth, ahead) = if baseline { (0.12, 0) } else { (1.0, 18) };
@@ -223,9 +184,7 @@ fn trace(
             })
         })
         .collect();
-    let reference = (0..desired.len())
-        .map(|i| desired[(i + ahead).min(desired.len() - 1)])
-        .collect();
+    let reference = (0..desired.len()).map(|i| desired[(i + ahead).min(desired.len() - 1)]).collect();
     FlightTrace {
         trajectory: format!("stroke {stroke}"),
         vehicle: "crazyflie".to_owned(),

@@ -20,31 +20,16 @@ pub fn console_table(results: &Results) -> String {
     let several_seeds = cases.iter().any(|case| case.seed != cases[0].seed);
 
     let mut table = Table::new();
-    table
-        .load_style(presets::UTF8_HORIZONTAL_ONLY)
-        .set_content_arrangement(ContentArrangement::Disabled)
-        .set_header(
-            std::iter::once(Cell::new("vehicle; gains,\ncondition, speed")).chain(
-                methods
-                    .iter()
-                    .map(|method| right(method.heading().join("\n").trim_end())),
-            ),
-        );
+    table.load_style(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Disabled).set_header(
+        std::iter::once(Cell::new("vehicle; gains,\ncondition, speed"))
+            .chain(methods.iter().map(|method| right(method.heading().join("\n").trim_end()))),
+    );
     for case in &cases {
-        let mut name = format!(
-            "{}\n{} {} {}",
-            case.vehicle,
-            case.gains,
-            case.condition,
-            speed(case.speed)
-        );
+        let mut name = format!("{}\n{} {} {}", case.vehicle, case.gains, case.condition, speed(case.speed));
         if several_seeds {
             let _ = write!(name, " seed {}", case.seed);
         }
-        table.add_row(
-            std::iter::once(Cell::new(name))
-                .chain(methods.iter().map(|method| right(&cell(case.row(*method))))),
-        );
+        table.add_row(std::iter::once(Cell::new(name)).chain(methods.iter().map(|method| right(&cell(case.row(*method))))));
     }
     for column in table.column_iter_mut() {
         column.set_padding((0, 1));
@@ -72,10 +57,8 @@ fn cell(row: Option<&Row>) -> String {
 }
 
 fn legend(results: &Results, cases: &[Case<'_>]) -> String {
-    let flights = flights_in_words(cases, &results.per_flight).map_or_else(
-        || "over all flights".to_owned(),
-        |count| format!("over {count} flights of unseen trajectories"),
-    );
+    let flights = flights_in_words(cases, &results.per_flight)
+        .map_or_else(|| "over all flights".to_owned(), |count| format!("over {count} flights of unseen trajectories"));
     let mut text = format!(
         "\
 Each cell, {flights}: mean RMS position error in cm; below it its reduction in %, mean/worst flight.
@@ -85,11 +68,7 @@ Each cell, {flights}: mean RMS position error in cm; below it its reduction in %
   net int8 + lane is what is flashed. 1.7x: times the drawn speed. +20ms: 20 ms more delay in the whole loop, at test time only.
 "
     );
-    let _ = writeln!(
-        text,
-        "Seed {}, version {}. Again: {}",
-        results.seed, results.software_version, results.command
-    );
+    let _ = writeln!(text, "Seed {}, version {}. Again: {}", results.seed, results.software_version, results.command);
     text
 }
 
@@ -123,15 +102,8 @@ Seed 7, version 0.1.0. Again: host-sim --seed 7
     #[test]
     fn all_methods_fit_into_132_columns() {
         let text = console_table(&fixture::full());
-        let widest = text
-            .lines()
-            .max_by_key(|line| line.chars().count())
-            .unwrap();
-        assert!(
-            widest.chars().count() <= 132,
-            "{} columns: {widest}",
-            widest.chars().count()
-        );
+        let widest = text.lines().max_by_key(|line| line.chars().count()).unwrap();
+        assert!(widest.chars().count() <= 132, "{} columns: {widest}", widest.chars().count());
     }
 
     #[test]

@@ -20,40 +20,24 @@ fn place(reduction: f64) -> f64 {
 }
 
 /// A line from the worst flight to the mean for each method; `None` when the case has no method but the baseline.
-pub(in crate::report) fn reduction_by_method(
-    case: &Case<'_>,
-    methods: &[Method],
-) -> anyhow::Result<Option<Markup>> {
-    let rows: Vec<_> = methods
-        .iter()
-        .filter(|method| **method != Method::Baseline)
-        .filter_map(|method| case.row(*method))
-        .collect();
+pub(in crate::report) fn reduction_by_method(case: &Case<'_>, methods: &[Method]) -> anyhow::Result<Option<Markup>> {
+    let rows: Vec<_> =
+        methods.iter().filter(|method| **method != Method::Baseline).filter_map(|method| case.row(*method)).collect();
     if rows.is_empty() {
         return Ok(None);
     }
     let chart = Rows::new(place(TICKS[0])..place(HIGHEST), rows.len());
-    let title = format!(
-        "Error reduction by method, {} {}, {}",
-        case.vehicle, case.gains, case.condition
-    );
+    let title = format!("Error reduction by method, {} {}, {}", case.vehicle, case.gains, case.condition);
     let description = "For each method a line from the worst flight (ring) to the mean of all flights (dot), in per cent.";
     panel(chart.size(), &title, description, |area| {
         let ticks = TICKS.map(|tick| (place(tick), format!("{tick:.0}")));
         chart.scale(area, &ticks, "reduction of the error [%], log scale")?;
         for (line, row) in rows.iter().enumerate() {
-            let figure = with_minus_sign(&mean_and_worst(
-                row.reduction_mean,
-                row.reduction_worst,
-                " / ",
-            ));
+            let figure = with_minus_sign(&mean_and_worst(row.reduction_mean, row.reduction_worst, " / "));
             chart.names(area, line, row.method, &figure)?;
             let (colour, y) = (ink(row.method), chart.y(line, 0.0));
             if row.reduction_mean.is_finite() && row.reduction_worst.is_finite() {
-                let ends = vec![
-                    (chart.x(place(row.reduction_worst)), y),
-                    (chart.x(place(row.reduction_mean)), y),
-                ];
+                let ends = vec![(chart.x(place(row.reduction_worst)), y), (chart.x(place(row.reduction_mean)), y)];
                 area.draw(&PathElement::new(ends, colour.line(2.0)))?;
             }
             if row.reduction_worst.is_finite() {
@@ -62,11 +46,7 @@ pub(in crate::report) fn reduction_by_method(
                 area.draw(&Circle::new(worst, units(4.0), colour.line(1.6)))?;
             }
             if row.reduction_mean.is_finite() {
-                area.draw(&Circle::new(
-                    (chart.x(place(row.reduction_mean)), y),
-                    units(4.5),
-                    colour.fill(),
-                ))?;
+                area.draw(&Circle::new((chart.x(place(row.reduction_mean)), y), units(4.5), colour.fill()))?;
             }
         }
         Ok(())
