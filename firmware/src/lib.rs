@@ -32,3 +32,5 @@ pub mod control;
 pub mod quadrotor;
 
 pub mod flight;
+
+pub mod replay;
