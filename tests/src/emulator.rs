@@ -3,6 +3,7 @@
 //! Nothing here skips: without the compiler's target or without QEMU a test fails, with the line that installs what is missing.
 
 use std::{
+    collections::BTreeSet,
     env,
     ffi::OsString,
     fs::{self, File},
@@ -10,6 +11,7 @@ use std::{
     io::{ErrorKind, Read},
     path::{Path, PathBuf},
     process::{Command, ExitStatus, Stdio},
+    sync::{Mutex, PoisonError},
     thread,
     time::Duration,
 };
@@ -24,8 +26,9 @@ pub const TARGET: &str = "thumbv7em-none-eabihf";
 pub const TOOLCHAIN_VARIABLE: &str = "IMPROMPTU_THUMB_TOOLCHAIN";
 
 /// Variables that would change the build (flags of a coverage or sanitiser run, another target, a wrapper) and with it the
-/// instruction counts, or break it.
-const FOREIGN_VARIABLES: [&str; 8] = [
+/// instruction counts, or break it. The model is named by the test alone.
+const FOREIGN_VARIABLES: [&str; 9] = [
+    "IMPROMPTU_MODEL",
     "RUSTFLAGS",
     "CARGO_ENCODED_RUSTFLAGS",
     "CARGO_BUILD_RUSTFLAGS",
@@ -50,29 +53,34 @@ pub struct Output {
 impl Output {
     /// The JSON line that a successful run prints.
     pub fn report(&self) -> Result<serde_json::Value> {
-        let Self {
-            status,
-            stdout,
-            stderr,
-        } = self;
-        ensure!(
-            status.success(),
-            "the emulated board failed ({status}):\n{stdout}{stderr}"
-        );
-        serde_json::from_str(stdout).with_context(|| {
-            format!("the emulated board printed no report, but:\n{stdout}{stderr}")
-        })
+        let Self { status, stdout, stderr } = self;
+        ensure!(status.success(), "the emulated board failed ({status}):\n{stdout}{stderr}");
+        serde_json::from_str(stdout).with_context(|| format!("the emulated board printed no report, but:\n{stdout}{stderr}"))
     }
 }
 
 /// Builds the firmware's binary `bin` as it is flashed, with additional variables in its environment, and gives the ELF file.
 ///
-/// Cargo works in a target folder of its own, so that it neither waits for the build that runs the tests nor disturbs it.
+/// Once for each environment in a run of the tests. Cargo works in a target folder of its own, so that it neither waits for the build
+/// that runs the tests nor disturbs it.
 pub fn build_firmware(bin: &str, environment: &[(&str, &str)]) -> Result<PathBuf> {
-    require_target()?;
+    static BUILT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
     let folder = target_folder();
-    fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
-    // Held until the ELF is copied: a build with another environment writes to the same name.
+    let mut variant = DefaultHasher::new();
+    environment.hash(&mut variant);
+    let elf = folder.join(format!("{bin}-{:016x}.elf", variant.finish()));
+    let mut built = BUILT.lock().unwrap_or_else(PoisonError::into_inner);
+    if !built.contains(&elf) {
+        build(bin, environment, &folder, &elf)?;
+        built.insert(elf.clone());
+    }
+    Ok(elf)
+}
+
+fn build(bin: &str, environment: &[(&str, &str)], folder: &Path, elf: &Path) -> Result<()> {
+    require_target()?;
+    fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
+    // Held until the ELF is copied: a build with another environment, in another process, writes to the same name.
     let lock = File::create(folder.join("emulator.lock"))?;
     lock.lock()?;
     let built = tool("cargo")
@@ -80,21 +88,16 @@ pub fn build_firmware(bin: &str, environment: &[(&str, &str)]) -> Result<PathBuf
         .args(["build", "--package", "impromptu-firmware", "--bin", bin])
         .args(["--target", TARGET, "--profile", "firmware", "--locked"])
         .arg("--target-dir")
-        .arg(&folder)
+        .arg(folder)
         .envs(environment.iter().copied())
         .output()
         .context("cannot start cargo")?;
-    ensure!(
-        built.status.success(),
-        "the firmware does not build:\n{}",
-        String::from_utf8_lossy(&built.stderr)
-    );
-    let mut variant = DefaultHasher::new();
-    environment.hash(&mut variant);
-    let elf = folder.join(format!("{bin}-{:016x}.elf", variant.finish()));
-    fs::copy(folder.join(TARGET).join("firmware").join(bin), &elf)
-        .with_context(|| format!("cannot copy the binary to {}", elf.display()))?;
-    Ok(elf)
+    ensure!(built.status.success(), "the firmware does not build:\n{}", String::from_utf8_lossy(&built.stderr));
+    // Renamed when complete: another process may be starting the same board.
+    let copy = folder.join("emulator.copy");
+    fs::copy(folder.join(TARGET).join("firmware").join(bin), &copy)
+        .and_then(|_| fs::rename(&copy, elf))
+        .with_context(|| format!("cannot copy the binary to {}", elf.display()))
 }
 
 /// Runs `elf` on the emulated board in `working_dir`, where it finds and leaves its files, for at most `timeout`.
@@ -111,10 +114,7 @@ pub fn run(elf: &Path, working_dir: &Path, timeout: Duration) -> Result<Output> 
         .spawn()
         .map_err(|error| match error.kind() {
             ErrorKind::NotFound if working_dir.is_dir() => missing_emulator(program),
-            _ => anyhow!(error).context(format!(
-                "cannot start {program} in {}",
-                working_dir.display()
-            )),
+            _ => anyhow!(error).context(format!("cannot start {program} in {}", working_dir.display())),
         })?;
     // Drained while it runs: a full pipe would stop the emulator.
     let stdout = drain(child.stdout.take());
@@ -127,17 +127,9 @@ pub fn run(elf: &Path, working_dir: &Path, timeout: Duration) -> Result<Output> 
     let stdout = stdout.join().unwrap_or_default();
     let stderr = stderr.join().unwrap_or_default();
     let Some(status) = ended else {
-        bail!(
-            "{} did not end within {} s and was stopped; it printed:\n{stdout}{stderr}",
-            elf.display(),
-            timeout.as_secs_f64()
-        );
+        bail!("{} did not end within {} s and was stopped; it printed:\n{stdout}{stderr}", elf.display(), timeout.as_secs_f64());
     };
-    Ok(Output {
-        status,
-        stdout,
-        stderr,
-    })
+    Ok(Output { status, stdout, stderr })
 }
 
 /// Reads a pipe to its end in the background.
@@ -154,20 +146,13 @@ fn drain(pipe: Option<impl Read + Send + 'static>) -> thread::JoinHandle<String>
 
 /// The error for a machine without QEMU.
 fn missing_emulator(program: &str) -> anyhow::Error {
-    let install = if cfg!(target_os = "macos") {
-        "brew install qemu"
-    } else {
-        "sudo apt-get install qemu-system-arm"
-    };
+    let install = if cfg!(target_os = "macos") { "brew install qemu" } else { "sudo apt-get install qemu-system-arm" };
     anyhow!("{program} is not installed; run: {install}")
 }
 
 /// Fails, with what to do, if the compiler has no library for [`TARGET`].
 fn require_target() -> Result<()> {
-    let asked = tool("rustc")
-        .args(["--print", "target-libdir", "--target", TARGET])
-        .output()
-        .context("cannot start rustc")?;
+    let asked = tool("rustc").args(["--print", "target-libdir", "--target", TARGET]).output().context("cannot start rustc")?;
     let folder = String::from_utf8_lossy(&asked.stdout).trim().to_owned();
     ensure!(
         asked.status.success() && Path::new(&folder).is_dir(),
@@ -204,14 +189,10 @@ fn tool(name: &str) -> Command {
 /// How cargo itself would start the emulator: the runner in `.cargo/config.toml`.
 fn runner() -> Result<Vec<String>> {
     let path = workspace().join(".cargo/config.toml");
-    let text =
-        fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
-    let config: toml::Table =
-        toml::from_str(&text).with_context(|| format!("cannot read {}", path.display()))?;
+    let text = fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
+    let config: toml::Table = toml::from_str(&text).with_context(|| format!("cannot read {}", path.display()))?;
     let runner = config["target"][TARGET]["runner"].clone();
-    runner
-        .try_into()
-        .with_context(|| format!("{}: target.{TARGET}.runner is not a list", path.display()))
+    runner.try_into().with_context(|| format!("{}: target.{TARGET}.runner is not a list", path.display()))
 }
 
 /// The folder of the workspace.
@@ -219,8 +200,16 @@ fn workspace() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
 }
 
-/// Where the firmware is built.
-fn target_folder() -> PathBuf {
+/// The compiler that builds the firmware, as it calls itself. A toolchain made by hand has a core library of its own and says so.
+pub fn compiler() -> Result<String> {
+    let asked = tool("rustc").arg("--version").output().context("cannot start rustc")?;
+    let own = env::var_os(TOOLCHAIN_VARIABLE).is_some_and(|value| !value.is_empty());
+    let version = String::from_utf8_lossy(&asked.stdout).trim().to_owned();
+    Ok(if own { format!("{version}, core library of {TOOLCHAIN_VARIABLE}") } else { version })
+}
+
+/// Where the firmware is built and flown.
+pub(crate) fn target_folder() -> PathBuf {
     match env::var_os("CARGO_TARGET_DIR") {
         Some(folder) => workspace().join(folder).join("firmware"),
         None => workspace().join("target/firmware"),
