@@ -1,6 +1,6 @@
 //! A recorded flight: every call of the flight stack in order, and its answers, so that another machine can fly it again.
 //!
-//! *in* the calls of [`Flight`], bit by bit; *out* fixed-size records that are read and written one at a time; *never* a record that is
+//! *in* the calls of [`crate::flight::Flight`], bit by bit; *out* fixed-size records that are read and written one at a time; *never* a record that is
 //! rounded, normalised or skipped: what cannot be flown again to the bit is refused; *source* this file is the format's specification.
 //!
 //! A **recording** is a header of [`HEADER`] bytes, then records of [`RECORD`] bytes, the last of which is [`Event::End`]:
