@@ -21,8 +21,8 @@ pub struct Recorded<S> {
 
 /// Writes down a flight while it is flown, into anything that takes bytes (a `Vec<u8>`).
 ///
-/// Whoever flies a [`crate::flight::Flight`] tells the recorder of each call: what happens between ticks before it takes effect, and each tick with the
-/// answer.
+/// Whoever flies a [`crate::flight::Flight`] tells the recorder of each call: what happens between ticks before it takes effect, and
+/// each tick with the answer.
 #[derive(Clone, Debug)]
 pub struct Recorder<S> {
     recorded: Recorded<S>,
