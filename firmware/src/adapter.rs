@@ -50,11 +50,11 @@ impl<const D: usize, const M: usize, const R: usize, const N: usize> Signals for
     }
     #[inline]
     fn measured(&self, tick: i32, channel: usize) -> f32 {
-        self.measured.channel(tick.div_euclid(self.divisor), channel)
+        self.measured.channel(tick.div_euclid(self.divisor.max(1)), channel)
     }
     #[inline]
     fn reference(&self, tick: i32, channel: usize) -> f32 {
-        self.references.channel(tick.div_euclid(self.divisor), channel)
+        self.references.channel(tick.div_euclid(self.divisor.max(1)), channel)
     }
 }
 
@@ -155,11 +155,16 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             self.correction = [0.0; MAX_OUTPUTS];
             self.settle(&[0.0; MAX_AXES]);
         }
-        let divisor = i32::from(self.model.card().timing.divisor);
+        let divisor = self.divisor();
         if tick.rem_euclid(divisor) == 0 {
             self.references.push(reference);
         }
         reference
+    }
+
+    /// Reference ticks in a sub-rate tick. A checked model has at least one; here the compiler sees it too and leaves no panic.
+    fn divisor(&self) -> i32 {
+        i32::from(self.model.card().timing.divisor).max(1)
     }
 
     fn fade(&mut self) {
@@ -173,7 +178,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     /// The network lane's correction at this tick.
     fn network<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M]) -> [f32; MAX_OUTPUTS] {
         let timing = self.model.card().timing;
-        let divisor = i32::from(timing.divisor);
+        let divisor = self.divisor();
         let phase = tick.rem_euclid(divisor);
         if phase == 0 {
             self.align(tick.div_euclid(divisor), measured);
@@ -221,7 +226,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         let mut outputs = [0.0; MAX_OUTPUTS];
         let Some(network) = self.model.network() else { return outputs };
         let card = self.model.card();
-        let divisor = i32::from(card.timing.divisor);
+        let divisor = self.divisor();
         let view = View { desired: preview, measured: &self.measured, references: &self.references, divisor };
         let mut inputs = [0.0; MAX_FEATURES];
         features::evaluate(&card.features, &view, target, divisor, &mut inputs);

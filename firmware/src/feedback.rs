@@ -133,10 +133,10 @@ impl AxisState {
 /// Shifts by one and stores the newest value in front.
 #[inline]
 fn push(lagged: &mut [f32; MAX_LAGS], lags: usize, newest: f32) {
-    if let Some(used) = lagged.get_mut(..lags) {
-        used.rotate_right(1);
+    let mut carried = newest;
+    for place in lagged.iter_mut().take(lags) {
+        core::mem::swap(place, &mut carried);
     }
-    lagged[0] = newest;
 }
 
 /// Σ c·(x - offset) in four interleaved sums: the same order on every machine, and not one long chain of additions.

@@ -3,6 +3,8 @@
 //! *in* the state at every control tick and the desired trajectory ahead of time; *out* a motor command; *never* an allocation, a panic,
 //! a global, or a clock of its own; *source* the loop of Zhou 2017, Fig. 1, with the rates of [`Rates`].
 
+use core::num::NonZeroU32;
+
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -62,7 +64,7 @@ pub type QuadrotorAdapter<'m> = Adapter<'m, DESIRED, MEASURED, REFERENCE>;
 /// The baseline loop with, if a model is given, the add-on before it.
 #[derive(Debug)]
 pub struct Flight<'m> {
-    position_divisor: u32,
+    position_divisor: NonZeroU32,
     preview: Preview<DESIRED, PREVIEW>,
     adapter: Option<QuadrotorAdapter<'m>>,
     position: PositionLoop,
@@ -80,7 +82,7 @@ impl<'m> Flight<'m> {
     pub fn new(settings: &Settings) -> Option<Self> {
         let mixer = Mixer::new(&settings.airframe)?;
         Some(Self {
-            position_divisor: settings.rates.position_divisor.max(1),
+            position_divisor: NonZeroU32::new(settings.rates.position_divisor).unwrap_or(NonZeroU32::MIN),
             preview: Preview::new(quadrotor::end_rules(), 0),
             adapter: None,
             position: PositionLoop::new(settings.position, settings.airframe.mass, settings.rates.reference_hz()),
@@ -139,7 +141,7 @@ impl<'m> Flight<'m> {
 
     /// One control tick.
     pub fn step(&mut self, tick: Tick, state: &State) -> MotorCommand {
-        if tick.0.is_multiple_of(self.position_divisor) {
+        if tick.0.is_multiple_of(self.position_divisor.get()) {
             let reference_tick = (tick.0 / self.position_divisor) as i32;
             self.reference = self.adapted(reference_tick, state);
             if self.excitation != nalgebra::Vector3::zeros() {

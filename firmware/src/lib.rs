@@ -11,6 +11,8 @@
 //! body to world, f32. The same bits on the host and on a Cortex-M4F. Errors exist where bytes enter
 //! ([`model::Model::from_bytes`]); in flight nothing returns a `Result`.
 #![cfg_attr(not(test), no_std)]
+// Tests may compare with the standard library.
+#![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 pub mod math;
 pub mod types;
@@ -32,3 +34,5 @@ pub mod control;
 pub mod quadrotor;
 
 pub mod flight;
+
+pub mod replay;

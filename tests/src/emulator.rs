@@ -3,6 +3,7 @@
 //! Nothing here skips: without the compiler's target or without QEMU a test fails, with the line that installs what is missing.
 
 use std::{
+    collections::BTreeSet,
     env,
     ffi::OsString,
     fs::{self, File},
@@ -10,6 +11,7 @@ use std::{
     io::{ErrorKind, Read},
     path::{Path, PathBuf},
     process::{Command, ExitStatus, Stdio},
+    sync::{Mutex, PoisonError},
     thread,
     time::Duration,
 };
@@ -24,8 +26,9 @@ pub const TARGET: &str = "thumbv7em-none-eabihf";
 pub const TOOLCHAIN_VARIABLE: &str = "IMPROMPTU_THUMB_TOOLCHAIN";
 
 /// Variables that would change the build (flags of a coverage or sanitiser run, another target, a wrapper) and with it the
-/// instruction counts, or break it.
-const FOREIGN_VARIABLES: [&str; 8] = [
+/// instruction counts, or break it. The model is named by the test alone.
+const FOREIGN_VARIABLES: [&str; 9] = [
+    "IMPROMPTU_MODEL",
     "RUSTFLAGS",
     "CARGO_ENCODED_RUSTFLAGS",
     "CARGO_BUILD_RUSTFLAGS",
@@ -58,12 +61,26 @@ impl Output {
 
 /// Builds the firmware's binary `bin` as it is flashed, with additional variables in its environment, and gives the ELF file.
 ///
-/// Cargo works in a target folder of its own, so that it neither waits for the build that runs the tests nor disturbs it.
+/// Once for each environment in a run of the tests. Cargo works in a target folder of its own, so that it neither waits for the build
+/// that runs the tests nor disturbs it.
 pub fn build_firmware(bin: &str, environment: &[(&str, &str)]) -> Result<PathBuf> {
-    require_target()?;
+    static BUILT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
     let folder = target_folder();
-    fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
-    // Held until the ELF is copied: a build with another environment writes to the same name.
+    let mut variant = DefaultHasher::new();
+    environment.hash(&mut variant);
+    let elf = folder.join(format!("{bin}-{:016x}.elf", variant.finish()));
+    let mut built = BUILT.lock().unwrap_or_else(PoisonError::into_inner);
+    if !built.contains(&elf) {
+        build(bin, environment, &folder, &elf)?;
+        built.insert(elf.clone());
+    }
+    Ok(elf)
+}
+
+fn build(bin: &str, environment: &[(&str, &str)], folder: &Path, elf: &Path) -> Result<()> {
+    require_target()?;
+    fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
+    // Held until the ELF is copied: a build with another environment, in another process, writes to the same name.
     let lock = File::create(folder.join("emulator.lock"))?;
     lock.lock()?;
     let built = tool("cargo")
@@ -71,17 +88,16 @@ pub fn build_firmware(bin: &str, environment: &[(&str, &str)]) -> Result<PathBuf
         .args(["build", "--package", "impromptu-firmware", "--bin", bin])
         .args(["--target", TARGET, "--profile", "firmware", "--locked"])
         .arg("--target-dir")
-        .arg(&folder)
+        .arg(folder)
         .envs(environment.iter().copied())
         .output()
         .context("cannot start cargo")?;
     ensure!(built.status.success(), "the firmware does not build:\n{}", String::from_utf8_lossy(&built.stderr));
-    let mut variant = DefaultHasher::new();
-    environment.hash(&mut variant);
-    let elf = folder.join(format!("{bin}-{:016x}.elf", variant.finish()));
-    fs::copy(folder.join(TARGET).join("firmware").join(bin), &elf)
-        .with_context(|| format!("cannot copy the binary to {}", elf.display()))?;
-    Ok(elf)
+    // Renamed when complete: another process may be starting the same board.
+    let copy = folder.join("emulator.copy");
+    fs::copy(folder.join(TARGET).join("firmware").join(bin), &copy)
+        .and_then(|_| fs::rename(&copy, elf))
+        .with_context(|| format!("cannot copy the binary to {}", elf.display()))
 }
 
 /// Runs `elf` on the emulated board in `working_dir`, where it finds and leaves its files, for at most `timeout`.
@@ -184,8 +200,16 @@ fn workspace() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
 }
 
-/// Where the firmware is built.
-fn target_folder() -> PathBuf {
+/// The compiler that builds the firmware, as it calls itself. A toolchain made by hand has a core library of its own and says so.
+pub fn compiler() -> Result<String> {
+    let asked = tool("rustc").arg("--version").output().context("cannot start rustc")?;
+    let own = env::var_os(TOOLCHAIN_VARIABLE).is_some_and(|value| !value.is_empty());
+    let version = String::from_utf8_lossy(&asked.stdout).trim().to_owned();
+    Ok(if own { format!("{version}, core library of {TOOLCHAIN_VARIABLE}") } else { version })
+}
+
+/// Where the firmware is built and flown.
+pub(crate) fn target_folder() -> PathBuf {
     match env::var_os("CARGO_TARGET_DIR") {
         Some(folder) => workspace().join(folder).join("firmware"),
         None => workspace().join("target/firmware"),

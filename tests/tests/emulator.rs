@@ -1,15 +1,13 @@
-//! The emulated microcontroller computes the same bits as the host, and its instruction counts repeat.
+//! The emulated microcontroller refuses bad input by name, and the tests never hang on it.
 
 use std::{fs, path::PathBuf, time::Duration};
 
-use impromptu_tests::emulator::{build_firmware, run};
-use nalgebra::{UnitQuaternion, Vector3};
+use impromptu_tests::{
+    board,
+    emulator::{build_firmware, run},
+};
 
-#[path = "../../firmware/src/bin/netduinoplus2/rotation.rs"]
-mod rotation;
-
-/// Far more than a run needs: about 0.2 s for 5,000 ticks.
-const TIMEOUT: Duration = Duration::from_secs(60);
+use crate::board::{flight, model};
 
 /// An empty folder for the test `name`.
 fn folder(name: &str) -> PathBuf {
@@ -21,57 +19,43 @@ fn folder(name: &str) -> PathBuf {
     folder
 }
 
-fn bytes(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
-    values.into_iter().flat_map(f32::to_le_bytes).collect()
-}
-
 #[test]
-fn every_bit_equals_the_host_and_instruction_counts_repeat() {
-    let elf = build_firmware("netduinoplus2", &[]).unwrap();
-    let folder = folder("emulator-bits");
-    let rates: Vec<_> = (0..5_000u16)
-        .map(|tick| {
-            let time = f32::from(tick) * 0.002;
-            Vector3::new(3.0 * (5.0 * time).sin(), 2.0 * (6.5 * time).cos(), time.sin())
-        })
-        .collect();
-    let input = bytes(rates.iter().flat_map(|rate| [rate.x, rate.y, rate.z]));
-    fs::write(folder.join("input.bin"), input).unwrap();
-
-    let first = run(&elf, &folder, TIMEOUT).unwrap().report().unwrap();
-    let output = fs::read(folder.join("output.bin")).unwrap();
-    let second = run(&elf, &folder, TIMEOUT).unwrap().report().unwrap();
-
-    assert_eq!(output.len(), rates.len() * 16);
-    let mut attitude = UnitQuaternion::identity();
-    for (tick, (rate, record)) in rates.iter().zip(output.chunks_exact(16)).enumerate() {
-        attitude = rotation::step(&attitude, rate);
-        let expected = bytes([attitude.w, attitude.i, attitude.j, attitude.k]);
-        assert_eq!(record, expected, "first difference at tick {tick}");
+fn a_recording_that_cannot_be_flown_again_ends_the_board_with_a_reason() {
+    let flight = flight::fly(None, 20, |_| None);
+    let length = flight.recording.len();
+    let damaged = |at: usize, byte: u8| {
+        let mut recording = flight.recording.clone();
+        recording[at] = byte;
+        recording
+    };
+    let record = impromptu_firmware::replay::RECORD;
+    let cases = [
+        ("missing", Vec::new(), "recording.bin in the folder"),
+        ("truncated", flight.recording[..length - record].to_vec(), "recording.bin in the folder"),
+        ("not a recording", damaged(0, b'X'), "not a recorded flight"),
+        ("version", damaged(8, 9), "format version 9"),
+        ("kind", damaged(length - 2 * record, 77), "tick 19: a record of unknown kind 77"),
+        ("ticks", damaged(length - record + 4, 21), "20 ticks and says 21"),
+        ("model", damaged(10, 1), "this binary holds none: build with IMPROMPTU_MODEL=FILE"),
+    ];
+    for (name, recording, reason) in cases {
+        let (output, _) = board::start(&format!("refused {name}"), None, &recording).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{name}: {output:?}");
+        assert!(output.stderr.contains(reason), "{name}: {output:?}");
+        assert!(output.report().is_err());
     }
-
-    assert_eq!(first, second, "two runs of the same input");
-    assert_eq!(first["ticks"], 5_000);
-    assert_eq!(first["instructions"]["step"]["runs"], 5_000);
-    assert!(first["instructions"]["step"]["most"].as_u64().unwrap() > 100);
-    let stack = first["stack_used_bytes"].as_u64().unwrap();
-    assert!((64..8_192).contains(&stack), "{stack} bytes of stack");
 }
 
 #[test]
-fn bad_input_ends_the_board_with_a_reason() {
-    let elf = build_firmware("netduinoplus2", &[]).unwrap();
-    let folder = folder("emulator-refuses");
-    let missing = run(&elf, &folder, TIMEOUT).unwrap();
-    assert_eq!(missing.status.code(), Some(1));
-    assert!(missing.stderr.contains("input.bin"), "{missing:?}");
-
-    fs::write(folder.join("input.bin"), [0; 13]).unwrap();
-    let broken = run(&elf, &folder, TIMEOUT).unwrap();
-    assert_eq!(broken.status.code(), Some(1));
-    assert!(broken.stderr.contains("13 bytes"), "{broken:?}");
-    assert!(!folder.join("output.bin").exists());
-    assert!(broken.report().is_err());
+fn a_damaged_model_ends_the_board_with_the_refusal() {
+    let flight = flight::fly(None, 20, |_| None);
+    let mut file = model::file(&model::Shape { hidden: &[], ..model::TANH }, impromptu_model_export::Precision::Float);
+    let last = file.len() - 1;
+    file[last] ^= 1;
+    let (output, answers) = board::start("refused damaged model", Some(&file), &flight.recording).unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(output.stderr.contains("the model in this binary: check sum"), "{output:?}");
+    assert_eq!(answers, None);
 }
 
 #[test]

@@ -1,3 +1,4 @@
 //! Table of contents of the promises.
 
+mod board;
 mod emulator;

@@ -1,103 +1,176 @@
-//! Reads the input tick by tick, computes, writes the output and keeps account of the cost.
+//! Flies a recording again, writes the answers and keeps account of the cost.
 //!
-//! Only one record of each file is in memory at a time, so the length of a run is not limited by the 128 KiB of RAM.
+//! Only one record is in memory at a time, so the length of a flight is not limited by the 128 KiB of RAM.
 
-use core::fmt;
+use core::{fmt, hint::black_box};
 
-use nalgebra::{UnitQuaternion, Vector3};
+use impromptu_firmware::{
+    adapter::Lanes,
+    flight::Flight,
+    model::{Model, Refusal},
+    replay::{Event, HEADER, Header, RECORD, RecordingError, answer},
+    types::Tick,
+};
 use semihosting::{
     fs::File,
     io::{Read, Write},
 };
+use static_cell::StaticCell;
 
 use crate::{
-    instruments::{InstructionCounter, StackGauge, StageCost},
-    rotation,
+    instruments::{InstructionCounter, StackGauge},
+    report::{Cost, Report},
 };
 
-/// Bytes of one input record: body rate x, y, z (rad/s) as little-endian f32.
-const INPUT_RECORD: usize = 12;
-/// Bytes of one output record: attitude w, x, y, z as little-endian f32.
-const OUTPUT_RECORD: usize = 16;
+/// On a boundary that suits every section of the file.
+#[repr(C, align(16))]
+struct Aligned<T: ?Sized>(T);
 
-/// Why a run was given up.
+/// The model file in flash; empty if the binary was built without one.
+static MODEL: &Aligned<[u8]> = &Aligned(*include_bytes!(concat!(env!("OUT_DIR"), "/model")));
+
+/// Why a flight was given up; displayed with what to do.
 pub(crate) enum ReplayError {
-    /// The board does not run as it must; what to do.
+    /// The board does not run as it must.
     Board(&'static str),
     /// A file could not be opened, read or written.
     File(&'static str, semihosting::io::Error),
-    /// The length of the input is not a multiple of a record.
-    Length(u64),
+    /// The binary's model is not flown.
+    Model(Refusal),
+    /// The recording was flown with a model of this check sum, the binary holds another or none.
+    OtherModel(u32, Option<u32>),
+    /// The recording cannot be flown again, from this tick on.
+    Recording(u32, RecordingError),
+    /// The rotors of the settings cannot produce every moment.
+    Airframe,
+    /// The end says that there are as many ticks as the second number, found was the first.
+    Ticks(u32, u32),
 }
 
 impl fmt::Display for ReplayError {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
+        match *self {
             Self::Board(reason) => formatter.write_str(reason),
-            Self::File(name, error) => {
+            Self::File(name, ref error) => {
                 write!(formatter, "{name} in the folder where the emulator was started: {error}")
             }
-            Self::Length(length) => write!(formatter, "input.bin has {length} bytes, not a multiple of {INPUT_RECORD}"),
+            Self::Model(refusal) => write!(formatter, "the model in this binary: {refusal}"),
+            Self::OtherModel(wanted, found) => {
+                write!(formatter, "recording.bin was flown with the model {wanted:08x}, this binary holds ")?;
+                match found {
+                    Some(found) => write!(formatter, "{found:08x}")?,
+                    None => formatter.write_str("none")?,
+                }
+                formatter.write_str(": build with IMPROMPTU_MODEL=FILE")
+            }
+            Self::Recording(tick, error) => write!(formatter, "recording.bin at tick {tick}: {error}"),
+            Self::Airframe => formatter.write_str("recording.bin: the rotors of its settings cannot produce every moment"),
+            Self::Ticks(found, told) => {
+                write!(formatter, "recording.bin has {found} ticks and says {told}: it is damaged, record the flight again")
+            }
         }
     }
 }
 
-/// What a run cost; displayed as a JSON object.
-pub(crate) struct Report {
-    ticks: u64,
-    step: StageCost,
-    stack_used: u32,
-    stack_size: u32,
-}
-
-impl fmt::Display for Report {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { ticks, step, stack_used, stack_size } = self;
-        write!(
-            formatter,
-            "{{\"board\":\"netduinoplus2\",\"ticks\":{ticks},\"instructions\":{{\"step\":{step}}},\
-             \"stack_used_bytes\":{stack_used},\"stack_size_bytes\":{stack_size}}}"
-        )
-    }
-}
-
-/// Replays `input.bin` into `output.bin`.
-pub(crate) fn run() -> Result<Report, ReplayError> {
+/// Flies `recording.bin` into `answers.bin`.
+pub(crate) fn run() -> Result<Report<'static>, ReplayError> {
     let counter = InstructionCounter::new().map_err(ReplayError::Board)?;
-    let mut input = File::open(c"input.bin").map_err(|error| ReplayError::File("input.bin", error))?;
-    let length = input.metadata().map_err(|error| ReplayError::File("input.bin", error))?.len();
-    if length % INPUT_RECORD as u64 != 0 {
-        return Err(ReplayError::Length(length));
-    }
-    let ticks = length / INPUT_RECORD as u64;
-    let mut output = File::create(c"output.bin").map_err(|error| ReplayError::File("output.bin", error))?;
-
+    let mut cost = Cost::default();
     let stack = StackGauge::paint();
-    let mut attitude = UnitQuaternion::identity();
-    let mut step = StageCost::default();
-    for _ in 0..ticks {
-        let mut record = [0; INPUT_RECORD];
-        input.read_exact(&mut record).map_err(|error| ReplayError::File("input.bin", error))?;
-        let rate = Vector3::from(floats(&record));
-        let instructions;
-        (attitude, instructions) = counter.measure(|| rotation::step(&attitude, &rate));
-        step.add(instructions);
+    let model = load(&counter, &mut cost)?;
+    let stack_load = stack.high_water();
 
-        let [x, y, z, w] = attitude.coords.into();
-        let mut record = [0; OUTPUT_RECORD];
-        for (bytes, value) in record.as_chunks_mut().0.iter_mut().zip([w, x, y, z]) {
-            *bytes = f32::to_le_bytes(value);
-        }
-        output.write_all(&record).map_err(|error| ReplayError::File("output.bin", error))?;
-    }
-    Ok(Report { ticks, step, stack_used: stack.high_water(), stack_size: stack.size() })
+    let mut recording = File::open(c"recording.bin").map_err(in_recording)?;
+    let (flight, clock) = start(&mut recording, model)?;
+    let stack = StackGauge::paint();
+    let ticks = fly(&counter, &mut recording, flight, &clock, &mut cost)?;
+    Ok(Report {
+        model: model.map(Into::into),
+        ticks,
+        cost,
+        stack_load,
+        stack_flight: stack.high_water(),
+        stack_size: stack.size(),
+    })
 }
 
-/// The little-endian numbers of a record.
-fn floats<const N: usize>(record: &[u8]) -> [f32; N] {
-    let mut values = [0.0; N];
-    for (value, bytes) in values.iter_mut().zip(record.as_chunks().0) {
-        *value = f32::from_le_bytes(*bytes);
+/// The model in this binary, if it holds one.
+#[inline(never)]
+fn load(counter: &InstructionCounter, cost: &mut Cost) -> Result<Option<&'static Model<'static>>, ReplayError> {
+    static PLACE: StaticCell<Model<'static>> = StaticCell::new();
+    // The compiler shall not check the model in the board's place.
+    let file = black_box(&MODEL.0);
+    if file.is_empty() {
+        return Ok(None);
     }
-    values
+    let (model, instructions) = counter.measure(|| Model::from_bytes(file));
+    cost.load.add(instructions);
+    Ok(Some(PLACE.init(model.map_err(ReplayError::Model)?)))
+}
+
+/// Which control ticks are ticks of the slower loops.
+struct Clock {
+    /// Control ticks in a reference tick.
+    reference: u32,
+    /// Control ticks in a sub-rate tick of the add-on.
+    sub_rate: Option<u32>,
+}
+
+/// The flight stack of the recording's header, on the ground.
+#[inline(never)]
+fn start(
+    recording: &mut File,
+    model: Option<&'static Model<'static>>,
+) -> Result<(&'static mut Flight<'static>, Clock), ReplayError> {
+    static PLACE: StaticCell<Flight<'static>> = StaticCell::new();
+    let mut header = [0; HEADER];
+    recording.read_exact(&mut header).map_err(in_recording)?;
+    let Header { settings, model: flown } = Header::from_bytes(&header).map_err(|error| ReplayError::Recording(0, error))?;
+    let flight = PLACE.init(Flight::new(&settings).ok_or(ReplayError::Airframe)?);
+    let mut clock = Clock { reference: settings.rates.position_divisor.max(1), sub_rate: None };
+    if let Some(wanted) = flown {
+        let model = model
+            .filter(|model| model.checksum() == wanted)
+            .ok_or(ReplayError::OtherModel(wanted, model.map(Model::checksum)))?;
+        flight.attach(model, &settings, Lanes::NONE).map_err(ReplayError::Model)?;
+        clock.sub_rate = Some(clock.reference * u32::from(model.card().timing.divisor));
+    }
+    Ok((flight, clock))
+}
+
+/// Makes the recorded calls; gives the number of ticks.
+#[inline(never)]
+fn fly(
+    counter: &InstructionCounter,
+    recording: &mut File,
+    flight: &mut Flight<'_>,
+    clock: &Clock,
+    cost: &mut Cost,
+) -> Result<u32, ReplayError> {
+    let mut answers = File::create(c"answers.bin").map_err(in_answers)?;
+    let mut tick = 0;
+    loop {
+        let mut record = [0; RECORD];
+        recording.read_exact(&mut record).map_err(in_recording)?;
+        let event = Event::from_bytes(&record).map_err(|error| ReplayError::Recording(tick, error))?;
+        match event {
+            Event::Tick(state) => {
+                let (command, instructions) = counter.measure(|| flight.step(Tick(tick), &state));
+                cost.of(tick, clock.reference, clock.sub_rate).add(instructions);
+                answers.write_all(&answer(&command, flight.reference())).map_err(in_answers)?;
+                tick += 1;
+            }
+            Event::End { ticks } if ticks == tick => return Ok(tick),
+            Event::End { ticks } => return Err(ReplayError::Ticks(tick, ticks)),
+            call => call.prepare(flight),
+        }
+    }
+}
+
+fn in_recording(error: semihosting::io::Error) -> ReplayError {
+    ReplayError::File("recording.bin", error)
+}
+
+fn in_answers(error: semihosting::io::Error) -> ReplayError {
+    ReplayError::File("answers.bin", error)
 }
