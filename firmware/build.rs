@@ -12,8 +12,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let memory = Path::new(&env::var("CARGO_MANIFEST_DIR")?).join("../memory.x");
     println!("cargo::rerun-if-changed={}", memory.display());
     let out = env::var("OUT_DIR")?;
-    fs::copy(&memory, Path::new(&out).join("memory.x"))
-        .map_err(|error| format!("cannot copy {}: {error}", memory.display()))?;
+    fs::copy(&memory, Path::new(&out).join("memory.x")).map_err(|error| format!("cannot copy {}: {error}", memory.display()))?;
     println!("cargo::rustc-link-search={out}");
     println!("cargo::rustc-link-arg-bins=-Tlink.x");
     // Without this the sections are padded to the host's page size.

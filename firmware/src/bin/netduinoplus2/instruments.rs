@@ -19,10 +19,7 @@ impl InstructionCounter {
     /// Takes the timer and checks it against a loop of known length.
     pub(crate) fn new() -> Result<Self, &'static str> {
         let peripherals = Peripherals::take().ok_or("the peripherals were taken before")?;
-        let mut counter = Self {
-            timer: peripherals.TIM2,
-            overhead: 0,
-        };
+        let mut counter = Self { timer: peripherals.TIM2, overhead: 0 };
         counter.overhead = counter.measure(|| ()).1;
         // The loop of `delay` has two instructions and runs as often as its argument says; the few more are NOPs that align it.
         let short = counter.measure(|| cortex_m::asm::delay(1_000)).1;
@@ -42,10 +39,7 @@ impl InstructionCounter {
         let start = self.timer.cnt().read().bits();
         let result = black_box(black_box(stage)());
         let end = self.timer.cnt().read().bits();
-        (
-            result,
-            end.wrapping_sub(start).saturating_sub(self.overhead),
-        )
+        (result, end.wrapping_sub(start).saturating_sub(self.overhead))
     }
 }
 
@@ -61,11 +55,7 @@ pub(crate) struct StageCost {
 impl StageCost {
     /// Adds one run of the stage.
     pub(crate) fn add(&mut self, instructions: u32) {
-        self.least = if self.runs == 0 {
-            instructions
-        } else {
-            self.least.min(instructions)
-        };
+        self.least = if self.runs == 0 { instructions } else { self.least.min(instructions) };
         self.most = self.most.max(instructions);
         self.total += u64::from(instructions);
         self.runs += 1;
@@ -75,11 +65,7 @@ impl StageCost {
 /// A JSON object.
 impl fmt::Display for StageCost {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            formatter,
-            "{{\"runs\":{},\"least\":{},\"most\":{},\"total\":{}}}",
-            self.runs, self.least, self.most, self.total
-        )
+        write!(formatter, "{{\"runs\":{},\"least\":{},\"most\":{},\"total\":{}}}", self.runs, self.least, self.most, self.total)
     }
 }
 

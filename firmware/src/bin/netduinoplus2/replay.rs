@@ -35,15 +35,9 @@ impl fmt::Display for ReplayError {
         match self {
             Self::Board(reason) => formatter.write_str(reason),
             Self::File(name, error) => {
-                write!(
-                    formatter,
-                    "{name} in the folder where the emulator was started: {error}"
-                )
+                write!(formatter, "{name} in the folder where the emulator was started: {error}")
             }
-            Self::Length(length) => write!(
-                formatter,
-                "input.bin has {length} bytes, not a multiple of {INPUT_RECORD}"
-            ),
+            Self::Length(length) => write!(formatter, "input.bin has {length} bytes, not a multiple of {INPUT_RECORD}"),
         }
     }
 }
@@ -58,12 +52,7 @@ pub(crate) struct Report {
 
 impl fmt::Display for Report {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            ticks,
-            step,
-            stack_used,
-            stack_size,
-        } = self;
+        let Self { ticks, step, stack_used, stack_size } = self;
         write!(
             formatter,
             "{{\"board\":\"netduinoplus2\",\"ticks\":{ticks},\"instructions\":{{\"step\":{step}}},\
@@ -75,27 +64,20 @@ impl fmt::Display for Report {
 /// Replays `input.bin` into `output.bin`.
 pub(crate) fn run() -> Result<Report, ReplayError> {
     let counter = InstructionCounter::new().map_err(ReplayError::Board)?;
-    let mut input =
-        File::open(c"input.bin").map_err(|error| ReplayError::File("input.bin", error))?;
-    let length = input
-        .metadata()
-        .map_err(|error| ReplayError::File("input.bin", error))?
-        .len();
+    let mut input = File::open(c"input.bin").map_err(|error| ReplayError::File("input.bin", error))?;
+    let length = input.metadata().map_err(|error| ReplayError::File("input.bin", error))?.len();
     if length % INPUT_RECORD as u64 != 0 {
         return Err(ReplayError::Length(length));
     }
     let ticks = length / INPUT_RECORD as u64;
-    let mut output =
-        File::create(c"output.bin").map_err(|error| ReplayError::File("output.bin", error))?;
+    let mut output = File::create(c"output.bin").map_err(|error| ReplayError::File("output.bin", error))?;
 
     let stack = StackGauge::paint();
     let mut attitude = UnitQuaternion::identity();
     let mut step = StageCost::default();
     for _ in 0..ticks {
         let mut record = [0; INPUT_RECORD];
-        input
-            .read_exact(&mut record)
-            .map_err(|error| ReplayError::File("input.bin", error))?;
+        input.read_exact(&mut record).map_err(|error| ReplayError::File("input.bin", error))?;
         let rate = Vector3::from(floats(&record));
         let instructions;
         (attitude, instructions) = counter.measure(|| rotation::step(&attitude, &rate));
@@ -106,16 +88,9 @@ pub(crate) fn run() -> Result<Report, ReplayError> {
         for (bytes, value) in record.as_chunks_mut().0.iter_mut().zip([w, x, y, z]) {
             *bytes = f32::to_le_bytes(value);
         }
-        output
-            .write_all(&record)
-            .map_err(|error| ReplayError::File("output.bin", error))?;
+        output.write_all(&record).map_err(|error| ReplayError::File("output.bin", error))?;
     }
-    Ok(Report {
-        ticks,
-        step,
-        stack_used: stack.high_water(),
-        stack_size: stack.size(),
-    })
+    Ok(Report { ticks, step, stack_used: stack.high_water(), stack_size: stack.size() })
 }
 
 /// The little-endian numbers of a record.

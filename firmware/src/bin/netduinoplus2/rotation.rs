@@ -9,7 +9,5 @@ const TICK: f32 = 0.002;
 pub(crate) fn step(attitude: &UnitQuaternion<f32>, rate: &Vector3<f32>) -> UnitQuaternion<f32> {
     let turned = attitude * UnitQuaternion::from_scaled_axis(rate * TICK);
     let Quaternion { coords } = *turned.quaternion();
-    UnitQuaternion::new_unchecked(Quaternion::from(
-        coords / libm::sqrtf(coords.norm_squared()),
-    ))
+    UnitQuaternion::new_unchecked(Quaternion::from(coords / libm::sqrtf(coords.norm_squared())))
 }
