@@ -325,7 +325,8 @@ fn same_signals(card: &Card<'_>, table: &SignalTable<'_>, counts: [usize; 3]) ->
     ];
     for ((signal, model, application), count) in pairs.into_iter().zip(counts) {
         let differs = model.iter().zip(application).position(|(a, b)| a != b);
-        let length = (model.len() != application.len() || model.len() != count).then_some(model.len().min(count));
+        let length =
+            (model.len() != application.len() || model.len() != count).then_some(model.len().min(application.len()).min(count));
         if let Some(channel) = differs.or(length) {
             return Err(Refusal::Signal { signal, channel: channel as u8 });
         }

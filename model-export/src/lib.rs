@@ -7,6 +7,7 @@
 pub mod cli;
 pub mod description;
 pub mod encode;
+pub mod export_error;
 pub mod float_network;
 pub mod inspection;
 pub mod quantise;
@@ -15,5 +16,6 @@ pub mod rows;
 pub mod verify;
 
 pub use description::Description;
-pub use encode::{ExportError, Precision, encode};
+pub use encode::{Precision, encode};
+pub use export_error::ExportError;
 pub use float_network::FloatNetwork;

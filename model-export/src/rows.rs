@@ -58,40 +58,47 @@ enum Reason {
 /// With file, line and column of what is wrong.
 pub fn read(path: &Path, features: usize) -> Result<Vec<Vec<f32>>, RowsError> {
     let fail = |place, reason| RowsError { path: path.to_owned(), place, reason };
-    let file = std::fs::File::open(path).map_err(|error| fail(Place::File, error.into()))?;
-    parse(file, features).map_err(|(place, reason)| fail(place, reason))
+    let bytes = std::fs::read(path).map_err(|error| fail(Place::File, error.into()))?;
+    parse(&bytes, features).map_err(|(place, reason)| fail(place, reason))
 }
 
-fn parse(source: impl io::Read, features: usize) -> Result<Vec<Vec<f32>>, (Place, Reason)> {
-    let mut reader = ReaderBuilder::new().trim(Trim::All).flexible(true).from_reader(source);
+fn parse(bytes: &[u8], features: usize) -> Result<Vec<Vec<f32>>, (Place, Reason)> {
+    let mut reader = ReaderBuilder::new().trim(Trim::All).flexible(true).from_reader(bytes);
     let from_csv = |error: csv::Error| {
-        let place = error.position().map_or(Place::File, |position| Place::Line(position.line()));
+        let place = error.position().map_or(Place::File, |position| Place::Line(line_of(bytes, position)));
         (place, Reason::Csv(error))
     };
     let header = reader.headers().map_err(from_csv)?.clone();
     if header.iter().next().is_some_and(|name| name.parse::<f32>().is_ok()) {
         return Err((Place::Line(1), Reason::NoHeader));
     }
-    let counted = |record: &StringRecord, line| {
+    let counted = |record: &StringRecord, line: &dyn Fn() -> u64| {
         let found = record.len();
-        if found == features { Ok(()) } else { Err((Place::Line(line), Reason::Columns { found, expected: features })) }
+        if found == features { Ok(()) } else { Err((Place::Line(line()), Reason::Columns { found, expected: features })) }
     };
-    counted(&header, 1)?;
+    counted(&header, &|| 1)?;
     let mut rows = Vec::new();
     for record in reader.records() {
         let record = record.map_err(from_csv)?;
-        let line = record.position().map_or(0, csv::Position::line);
-        counted(&record, line)?;
+        let line = || record.position().map_or(0, |position| line_of(bytes, position));
+        counted(&record, &line)?;
         let mut row = Vec::with_capacity(features);
         for (column, (text, name)) in record.iter().zip(&header).enumerate() {
             let value = text.parse::<f32>().ok().filter(|value| value.is_finite());
             row.push(value.ok_or_else(|| {
-                (Place::Column(line, column + 1), Reason::Number { text: text.to_owned(), name: name.to_owned() })
+                (Place::Column(line(), column + 1), Reason::Number { text: text.to_owned(), name: name.to_owned() })
             })?);
         }
         rows.push(row);
     }
     if rows.is_empty() { Err((Place::File, Reason::Empty)) } else { Ok(rows) }
+}
+
+/// Line on which a record starts; the reader counts the empty lines before a record to the record.
+fn line_of(bytes: &[u8], position: &csv::Position) -> u64 {
+    let (before, after) = bytes.split_at(bytes.len().min(position.byte() as usize));
+    let empty = after.iter().take_while(|byte| matches!(byte, b'\n' | b'\r'));
+    1 + before.iter().chain(empty).filter(|byte| **byte == b'\n').count() as u64
 }
 
 #[cfg(test)]
@@ -126,7 +133,7 @@ mod tests {
 
     #[test]
     fn bytes_that_are_no_text_are_refused_with_their_line() {
-        let (place, reason) = parse(&b"a,b\n1,\xff\n"[..], 2).unwrap_err();
+        let (place, reason) = parse(b"a,b\n1,\xff\n", 2).unwrap_err();
         assert!(matches!(place, Place::Line(2)), "{reason}");
     }
 }

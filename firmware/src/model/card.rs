@@ -111,6 +111,7 @@ pub struct Timing {
 
 /// A corrected reference channel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Output {
     /// Reference channel.
     pub channel: u8,
@@ -184,6 +185,7 @@ pub struct LaneAxis {
 /// Margins of the add-on's own loop, computed at design time on a model of longer memory than the one designed on. All finite: a margin
 /// that nothing limits is `f32::MAX`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Margins {
     /// Further delay that the loop bears, ms.
     pub delay_ms: f32,

@@ -1,7 +1,7 @@
 //! The one stored model type: checked once at load, then borrowed in place.
 //!
 //! *in* the bytes of a model file; *out* a [`Model`] whose every index, shape and probe has been checked; *never* a panic on
-//! any bytes; *source* [`file`] for the layout, [`Card`] for the fields.
+//! any bytes; *source* [`mod@file`] for the layout, [`Card`] for the fields.
 
 mod blob;
 mod card;

@@ -73,6 +73,9 @@ impl Export {
         };
         let text = std::fs::read_to_string(&description_path).with_context(|| description_path.display().to_string())?;
         let description = Description::from_json(&text).with_context(|| description_path.display().to_string())?;
+        if self.network.is_none() && !description.features.is_empty() {
+            bail!("{}: lists `features`, so give the --network that reads them", description_path.display());
+        }
         let network = self.network.as_deref().map(FloatNetwork::read).transpose()?;
         let calibration_path = self.calibration.clone().or_else(|| {
             let path = beside(self.network.as_deref()?, "rows.csv");

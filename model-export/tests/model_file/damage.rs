@@ -42,7 +42,10 @@ fn every_single_flipped_bit_is_refused() {
         match bit / 8 {
             0..8 => assert_eq!(refusal, Refusal::NotAModel),
             8..10 => assert!(matches!(refusal, Refusal::Version { .. })),
-            12..20 => assert!(matches!(refusal, Refusal::Length { .. } | Refusal::Shape { what: "file length", .. } | Refusal::Checksum { .. })),
+            12..20 => assert!(matches!(
+                refusal,
+                Refusal::Length { .. } | Refusal::Shape { what: "file length", .. } | Refusal::Checksum { .. }
+            )),
             20..24 | 32.. => assert!(matches!(refusal, Refusal::Checksum { .. }), "byte {}: {refusal}", bit / 8),
             _ => assert_eq!(refusal, Refusal::Value { what: "reserved part of the header" }),
         }

@@ -37,8 +37,12 @@ fn channel(name: &str, unit: &str, end: EndRule) -> ChannelDescription {
 /// Position and velocity along one axis, desired, measured and as a reference; one window of desired positions; both references corrected.
 pub(crate) fn description(window: usize) -> Description {
     let signal = vec![channel("position", "m", EndRule::Hold), channel("velocity", "m/s", EndRule::Zero)];
-    let feature =
-        |offset: usize| Feature { source: Source::Desired, channel: 0, offset: offset as i16 + 1, relative: Relative::Desired(0) };
+    let feature = |offset: usize| Feature {
+        source: Source::Desired,
+        channel: 0,
+        offset: offset as i16 + 1,
+        relative: Relative::Desired(0),
+    };
     Description {
         name: "small".into(),
         provenance: Provenance { vehicle: "cart".into(), software: "test".into(), seed: 7, ..Provenance::default() },
