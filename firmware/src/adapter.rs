@@ -90,7 +90,8 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         let card = model.card();
         same_signals(card, table, [D, M, R])?;
         let rate = card.timing.reference_rate_hz;
-        if (rate - rate_hz).abs() > 1e-3 * rate_hz {
+        let near = (rate - rate_hz).abs() <= 1e-3 * rate_hz;
+        if !near {
             return Err(Refusal::Rate { model: rate, application: rate_hz });
         }
         let (past, future) = card.preview_span();
@@ -101,7 +102,8 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             model,
             base: base_channels(table),
             measured: History::new([EndRule::Hold; M], 0),
-            references: History::new([EndRule::Hold; R], 0),
+            // No sub-rate tick is that low: the first one that is seen starts the histories.
+            references: History::new([EndRule::Hold; R], i32::MIN),
             ramp: [[0.0; MAX_OUTPUTS]; 2],
             primed: false,
             axes: [AxisState::REST; MAX_AXES],
@@ -145,15 +147,20 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     pub fn step<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M]) -> [f32; R] {
         let desired = preview.sample(tick);
         let mut reference = self.base.map(|channel| desired.get(channel).copied().unwrap_or(0.0));
+        let network = self.network(tick, preview, measured, &reference);
         self.fade();
-        let network = self.network(tick, preview, measured);
         let feedback = self.feedback(tick, preview, measured);
-        if self.network_weight > 0.0 || self.feedback_weight > 0.0 {
+        // The slew may need longer than the fade: off is when nothing is left.
+        let left = self.correction.iter().any(|correction| *correction != 0.0);
+        if left || self.network_weight > 0.0 || self.feedback_weight > 0.0 {
             self.apply(&mut reference, &network, &feedback);
         } else {
             // Not even an addition of zero: the baseline's bits.
             self.correction = [0.0; MAX_OUTPUTS];
             self.settle(&[0.0; MAX_AXES]);
+        }
+        if self.feedback_weight == 0.0 {
+            self.axes.iter_mut().for_each(AxisState::release);
         }
         let divisor = self.divisor();
         if tick.rem_euclid(divisor) == 0 {
@@ -171,17 +178,25 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         let ticks = self.model.card().timing.fade_ticks;
         let step = if ticks == 0 { 1.0 } else { 1.0 / f32::from(ticks) };
         let approach = |weight: f32, on: bool| clamp(if on { weight + step } else { weight - step }, 0.0, 1.0);
-        self.network_weight = approach(self.network_weight, self.lanes.network && self.model.network().is_some());
+        // The network lane has a value from its first sub-rate tick on: a fade that began before would end in a step.
+        let network = self.lanes.network && self.primed && self.model.network().is_some();
+        self.network_weight = approach(self.network_weight, network);
         self.feedback_weight = approach(self.feedback_weight, self.lanes.feedback && self.model.lane().is_some());
     }
 
-    /// The network lane's correction at this tick.
-    fn network<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M]) -> [f32; MAX_OUTPUTS] {
+    /// The network lane's correction at this tick; `base` is the reference without any.
+    fn network<const N: usize>(
+        &mut self,
+        tick: i32,
+        preview: &Preview<D, N>,
+        measured: &[f32; M],
+        base: &[f32; R],
+    ) -> [f32; MAX_OUTPUTS] {
         let timing = self.model.card().timing;
         let divisor = self.divisor();
         let phase = tick.rem_euclid(divisor);
         if phase == 0 {
-            self.align(tick.div_euclid(divisor), measured);
+            self.align(tick.div_euclid(divisor), measured, base);
             if self.lanes.network || self.network_weight > 0.0 {
                 let [start, end] = &mut self.ramp;
                 *start = *end;
@@ -212,11 +227,14 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         }
     }
 
-    /// Stores the measured channels of sub-rate tick `sub_tick`; histories start with the first tick that is seen.
-    fn align(&mut self, sub_tick: i32, measured: &[f32; M]) {
-        if self.measured.next_tick() != sub_tick {
+    /// Stores the measured channels of sub-rate tick `sub_tick`. Histories start anew with the first tick that is seen and after a gap;
+    /// the past reference is then the one that the loop would have got without corrections.
+    fn align(&mut self, sub_tick: i32, measured: &[f32; M], base: &[f32; R]) {
+        if self.references.next_tick() != sub_tick {
             self.measured = History::new([EndRule::Hold; M], sub_tick);
-            self.references = History::new([EndRule::Hold; R], sub_tick);
+            self.references = History::new([EndRule::Hold; R], sub_tick.wrapping_sub(1));
+            self.references.push(*base);
+            self.primed = false;
         }
         self.measured.push(measured.map(finite_or_zero));
     }
@@ -247,8 +265,8 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             let mut errors = [0.0; MAX_ERRORS];
             for (error, &(measured_channel, desired_channel)) in errors.iter_mut().zip(&axis.layout().errors) {
                 let channel = usize::from(desired_channel);
-                let newer = preview.channel(tick - whole, channel);
-                let older = preview.channel(tick - whole - 1, channel);
+                let newer = preview.channel(tick.wrapping_sub(whole), channel);
+                let older = preview.channel(tick.wrapping_sub(whole + 1), channel);
                 let then = newer + (older - newer) * share;
                 *error = measured.get(usize::from(measured_channel)).copied().unwrap_or(then) - then;
             }
@@ -312,7 +330,8 @@ fn same_signals(card: &Card<'_>, table: &SignalTable<'_>, counts: [usize; 3]) ->
     ];
     for ((signal, model, application), count) in pairs.into_iter().zip(counts) {
         let differs = model.iter().zip(application).position(|(a, b)| a != b);
-        let length = (model.len() != application.len() || model.len() != count).then_some(model.len().min(count));
+        let length =
+            (model.len() != application.len() || model.len() != count).then_some(model.len().min(application.len()).min(count));
         if let Some(channel) = differs.or(length) {
             return Err(Refusal::Signal { signal, channel: channel as u8 });
         }

@@ -30,6 +30,7 @@ pub enum Relative {
 
 /// One network input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Feature {
     /// Signal that is read.
     pub source: Source,

@@ -23,6 +23,8 @@ pub struct Axis<'a> {
     outputs: Floats<'a>,
     /// Steady-state value of the output for an integral of 1.
     slow_gain: f32,
+    /// Integral at which the slow part reaches its clamp.
+    integral_bound: f32,
 }
 
 /// A feedback lane whose shapes and values have been checked.
@@ -50,7 +52,9 @@ impl<'a> Lane<'a> {
             if !(denominator > 1e-3 && slow_gain.is_finite()) {
                 return Err(Refusal::Value { what: "sum of the lane's past-output coefficients" });
             }
-            let _ = axes.push(Axis { layout: axis.clone(), errors, outputs, slow_gain });
+            // Without a slow part nothing is integrated.
+            let integral_bound = if slow_gain == 0.0 { 0.0 } else { (axis.integral_limit / abs(slow_gain)).min(f32::MAX) };
+            let _ = axes.push(Axis { layout: axis.clone(), errors, outputs, slow_gain, integral_bound });
         }
         Ok(Self { lags, axes })
     }
@@ -93,14 +97,12 @@ impl AxisState {
     }
 
     /// Takes this tick's errors (in the order of the layout) and returns the lane's output on this axis.
-    /// `dt` is the reference's period, s. While not `engaged` the lags stay warm, the integral is zero and the output is not used.
+    /// `dt` is the reference's period, s. While not `engaged` the lags stay warm and the integral stands still: a lane that is faded
+    /// out must not lose its slow part at once; [`AxisState::release`] empties it afterwards.
     pub fn step(&mut self, lane: &Lane<'_>, axis: &Axis<'_>, errors: [f32; MAX_ERRORS], dt: f32, engaged: bool) -> f32 {
         let lags = lane.lags;
         for (lagged, error) in self.errors.iter_mut().zip(errors) {
             push(lagged, lags, finite_or_zero(error));
-        }
-        if !engaged {
-            self.integral = 0.0;
         }
         let layout = &axis.layout;
         let slow = clamp(axis.slow_gain * self.integral, -layout.integral_limit, layout.integral_limit);
@@ -115,18 +117,23 @@ impl AxisState {
         let bounded = clamp(fast, -layout.fast_limit, layout.fast_limit);
         self.clamped = bounded != fast;
         let increment = self.errors[0][0] * dt;
-        // Only its own clamp stops the integral: a constant disturbance larger than the fast clamp must still be absorbed.
-        let winds_up =
-            abs(axis.slow_gain * (self.integral + increment)) > layout.integral_limit && increment * self.integral > 0.0;
-        if engaged && !winds_up {
-            self.integral += increment;
+        // Only its own clamp stops the integral: a constant disturbance larger than the fast clamp must still be absorbed. The integral
+        // itself is bounded, so that neither a long nor a single huge error can wind it up.
+        if engaged {
+            let bound = axis.integral_bound;
+            self.integral = clamp(self.integral + finite_or_zero(increment), -bound, bound);
         }
         finite_or_zero(bounded) + slow
     }
 
     /// Tells the axis what was really applied of its output.
     pub fn applied(&mut self, lane: &Lane<'_>, value: f32) {
-        push(&mut self.outputs, lane.lags, value);
+        push(&mut self.outputs, lane.lags, finite_or_zero(value));
+    }
+
+    /// Empties the integral: the lane is faded out.
+    pub fn release(&mut self) {
+        self.integral = 0.0;
     }
 }
 

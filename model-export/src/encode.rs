@@ -11,7 +11,8 @@ use impromptu_firmware::{
 
 use crate::{
     description::{ChannelDescription, Description},
-    float_network::{Activation, FloatNetwork, FloatNetworkError},
+    export_error::ExportError,
+    float_network::{Activation, FloatNetwork},
     quantise::{IntegerLayer, quantise},
 };
 
@@ -22,40 +23,6 @@ pub enum Precision {
     Float,
     /// int8 weights, 16-bit activations.
     Int8,
-}
-
-/// Why no model file was made.
-#[derive(Debug, thiserror::Error)]
-pub enum ExportError {
-    /// The network's parts do not fit together.
-    #[error("network: {0}")]
-    Network(#[from] FloatNetworkError),
-    /// Network and description disagree.
-    #[error("{what}: the description has {description}, the network {network}")]
-    Mismatch {
-        /// What is counted.
-        what: &'static str,
-        /// Count in the description.
-        description: usize,
-        /// Count in the network.
-        network: usize,
-    },
-    /// More than the firmware's fixed sizes hold.
-    #[error("{what}: {found}, the firmware holds at most {limit}")]
-    TooMany {
-        /// What is counted.
-        what: &'static str,
-        /// Count found.
-        found: usize,
-        /// Largest count.
-        limit: usize,
-    },
-    /// Quantisation without rows to calibrate on.
-    #[error("int8 needs rows to calibrate on: give --calibration FILE.csv")]
-    NoCalibration,
-    /// The firmware refuses the file that came out.
-    #[error("the firmware refuses the result: {0}")]
-    Refused(Refusal),
 }
 
 /// Bulk numbers in file order, each section aligned.
@@ -103,6 +70,14 @@ fn bounded<T: Clone, const N: usize>(values: &[T], what: &'static str) -> Result
     heapless::Vec::from_slice(values).map_err(|_| ExportError::TooMany { what, found: values.len(), limit: N })
 }
 
+fn within(found: usize, what: &'static str, limit: usize) -> Result<(), ExportError> {
+    if found <= limit { Ok(()) } else { Err(ExportError::TooMany { what, found, limit }) }
+}
+
+fn matching(what: &'static str, expected: usize, found: usize) -> Result<(), ExportError> {
+    if found == expected { Ok(()) } else { Err(ExportError::Mismatch { what, expected, found }) }
+}
+
 fn activation(activation: Activation) -> network::Activation {
     match activation {
         Activation::Linear => network::Activation::Linear,
@@ -132,6 +107,9 @@ fn layout(
     }
     let mut inputs = network.inputs();
     let mut layers = Vec::new();
+    // Before any count is narrowed to the file's integers.
+    within(network.layers.len(), "dense layers", model::MAX_LAYERS)?;
+    network.layers.iter().try_for_each(|layer| within(layer.outputs(), "units in a layer", model::MAX_WIDTH))?;
     match precision {
         Precision::Float => {
             for layer in &network.layers {
@@ -153,7 +131,10 @@ fn layout(
             let integers = quantise(network, calibration.iter().map(Vec::as_slice));
             layout.arithmetic = Arithmetic::Int8;
             layout.input_code = integers.input_code;
-            for layer in &integers.layers {
+            for (index, layer) in integers.layers.iter().enumerate() {
+                if let Some(row) = layer.multipliers.iter().position(|multiplier| *multiplier == i32::MAX) {
+                    return Err(ExportError::Steep { layer: index, row });
+                }
                 layers.push(integer_layout(layer, inputs, blob));
                 inputs = layer.bias.len();
             }
@@ -193,12 +174,16 @@ fn channels<'a, const N: usize>(
 fn lane(description: &Description, blob: &mut BlobWriter) -> Result<Option<LaneLayout>, ExportError> {
     let Some(lane) = &description.lane else { return Ok(None) };
     let lags = lane.axes.first().map_or(0, |axis| axis.output_coefficients.len());
+    within(lags, "lags of the feedback lane", model::MAX_LAGS)?;
     let mut axes = Vec::new();
     for axis in &lane.axes {
+        matching(
+            "lists of error coefficients of a lane axis (one for each error)",
+            axis.errors.len(),
+            axis.error_coefficients.len(),
+        )?;
         for found in axis.error_coefficients.iter().chain([&axis.output_coefficients]).map(Vec::len) {
-            if found != lags {
-                return Err(ExportError::Mismatch { what: "lags of the feedback lane", description: lags, network: found });
-            }
+            matching("lags of the feedback lane (as many as the first axis' own)", lags, found)?;
         }
         let coefficients = axis.error_coefficients.iter().flatten().chain(&axis.output_coefficients).copied();
         axes.push(LaneAxis {
@@ -227,19 +212,15 @@ pub fn encode(
     let features = description.features.len();
     if let Some(network) = network {
         network.check()?;
-        let counts = [
-            ("inputs", features, network.inputs()),
-            ("outputs", description.outputs.len(), network.outputs()),
-            ("envelope", description.envelope.len(), network.inputs()),
-        ];
-        for (what, description, network) in counts {
-            if description != network {
-                return Err(ExportError::Mismatch { what, description, network });
-            }
-        }
+        matching("inputs of the network (one for each feature)", features, network.inputs())?;
+        matching("outputs of the network (one for each of the description)", description.outputs.len(), network.outputs())?;
     }
-    if let Some(row) = calibration.iter().find(|row| row.len() != features) {
-        return Err(ExportError::Mismatch { what: "columns of the calibration rows", description: features, network: row.len() });
+    matching("ranges of the envelope (one for each feature)", features, description.envelope.len())?;
+    for (index, row) in calibration.iter().enumerate() {
+        matching("columns of the calibration rows (one for each feature)", features, row.len())?;
+        if let Some(column) = row.iter().position(|value| !value.is_finite()) {
+            return Err(ExportError::CalibrationNotFinite { row: index + 1, column: column + 1 });
+        }
     }
     let mut blob = BlobWriter::default();
     let network = network.map(|network| layout(network, precision, calibration, &mut blob)).transpose()?;
@@ -269,7 +250,7 @@ pub fn encode(
             divisor: timing.divisor,
             interpolation: timing.interpolation,
             measurement_delay_ticks: timing.measurement_delay_s * timing.reference_rate_hz,
-            fade_ticks: (timing.fade_s * timing.reference_rate_hz).round() as u16,
+            fade_ticks: ticks("fade_s", timing.fade_s, timing.reference_rate_hz)?,
         },
         features: bounded(&description.features, "features")?,
         outputs: bounded(&description.outputs, "outputs")?,
@@ -283,7 +264,7 @@ pub fn encode(
     let bare_lane = Section { offset: 0, length: 0 };
     let mut bare = card.clone();
     bare.probes.lane = bare_lane;
-    let probe_rows = probe_rows(calibration, card.network.is_some());
+    let probe_rows = if card.network.is_some() { probe_rows(description, calibration) } else { Vec::new() };
     let (outputs, lane_probe) = expected(&bare, &blob, &probe_rows)?;
     card.probes = Probes {
         count: probe_rows.len() as u8,
@@ -295,10 +276,20 @@ pub fn encode(
     Ok(bytes)
 }
 
-/// Up to four rows, spread over the calibration rows.
-fn probe_rows(calibration: &[Vec<f32>], wanted: bool) -> Vec<Vec<f32>> {
+/// Up to four rows, spread over the calibration rows; without any the envelope's low end, middle and high end.
+fn probe_rows(description: &Description, calibration: &[Vec<f32>]) -> Vec<Vec<f32>> {
+    if calibration.is_empty() {
+        let at = |share: f32| description.envelope.iter().map(|(low, high)| low * (1.0 - share) + high * share).collect();
+        return [0.0, 0.5, 1.0].into_iter().map(at).collect();
+    }
     let step = (calibration.len() / 4).max(1);
-    calibration.iter().step_by(step).take(if wanted { 4 } else { 0 }).cloned().collect()
+    calibration.iter().step_by(step).take(4).cloned().collect()
+}
+
+/// A time as whole reference ticks.
+fn ticks(field: &'static str, seconds: f32, rate_hz: f32) -> Result<u16, ExportError> {
+    let ticks = (seconds * rate_hz).round();
+    if (0.0..=f32::from(u16::MAX)).contains(&ticks) { Ok(ticks as u16) } else { Err(ExportError::Time { field, seconds }) }
 }
 
 /// What the firmware computes for the probes.

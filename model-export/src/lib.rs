@@ -4,12 +4,18 @@
 //! `impromptu_firmware::model::Model::from_bytes` accepts; *never* a file that the firmware would refuse: every file is loaded by the
 //! firmware's own code before it is handed out; *source* the format in `impromptu_firmware::model::file`.
 
+pub mod cli;
 pub mod description;
 pub mod encode;
+pub mod export_error;
 pub mod float_network;
+pub mod inspection;
 pub mod quantise;
+pub mod replacement;
+pub mod rows;
 pub mod verify;
 
 pub use description::Description;
-pub use encode::{ExportError, Precision, encode};
+pub use encode::{Precision, encode};
+pub use export_error::ExportError;
 pub use float_network::FloatNetwork;

@@ -70,6 +70,14 @@ pub fn quantise<'r>(network: &FloatNetwork, rows: impl Iterator<Item = &'r [f32]
             Activation::Tanh => (1.0 / f64::from(TANH_INPUT_ONE), 1.0 / f64::from(CODE_LIMIT)),
             Activation::Relu | Activation::Linear => (unit_activation, unit_activation),
         };
+        let row_scales: Vec<f32> =
+            layer.weights.chunks(width.max(1)).zip(&layer.bias).map(|(row, bias)| row_scale(row, *bias, unit_in)).collect();
+        // A multiplier is below 1/2: where the next code would be finer than that, the accumulator's own step is the resolution.
+        let coarsest = row_scales.iter().fold(0.0f64, |coarsest, scale| coarsest.max(unit_in * f64::from(*scale)));
+        let (unit_pre, unit_out) = match layer.activation {
+            Activation::Tanh => (unit_pre, unit_out),
+            Activation::Relu | Activation::Linear => (unit_pre.max(2.001 * coarsest), unit_out.max(2.001 * coarsest)),
+        };
         let mut integer = IntegerLayer {
             weights: Vec::with_capacity(layer.weights.len()),
             bias: Vec::new(),
@@ -77,14 +85,14 @@ pub fn quantise<'r>(network: &FloatNetwork, rows: impl Iterator<Item = &'r [f32]
             row_scales: Vec::new(),
             activation: layer.activation,
         };
-        for (row, &bias) in layer.weights.chunks(width.max(1)).zip(&layer.bias) {
-            let scale = row_scale(row, bias, unit_in);
+        for ((row, &bias), scale) in layer.weights.chunks(width.max(1)).zip(&layer.bias).zip(row_scales) {
             integer.weights.extend(row.iter().map(|weight| (weight / scale).round().clamp(-127.0, 127.0) as i8));
             let unit = unit_in * f64::from(scale);
             integer.bias.push((f64::from(bias) / unit).round() as i32);
             if index == last {
                 integer.row_scales.push(unit as f32);
             } else {
+                // At `i32::MAX` a tanh layer is too steep; `encode` refuses it.
                 integer.multipliers.push((unit / unit_pre * 4_294_967_296.0).round().min(f64::from(i32::MAX)) as i32);
             }
         }

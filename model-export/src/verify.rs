@@ -1,9 +1,13 @@
 //! Float against quantised, over rows.
 
+use std::fmt;
+
+use comfy_table::{Table, presets};
 use impromptu_firmware::{
     model::{MAX_OUTPUTS, Model},
     network::Scratch,
 };
+use serde::Serialize;
 
 use crate::float_network::FloatNetwork;
 
@@ -16,24 +20,119 @@ pub struct Difference {
     pub rms: Vec<f64>,
     /// Largest magnitude over the rows, for each output, in its unit.
     pub largest: Vec<f64>,
+    /// Root mean square of the float network's own output, for each output, in its unit.
+    pub correction_rms: Vec<f64>,
 }
 
-/// Runs both over `rows` (features in physical units).
+/// Runs both over `rows` (features in physical units). A model without a network gives zeros everywhere.
 pub fn difference(model: &Model<'_>, network: &FloatNetwork, rows: &[Vec<f32>]) -> Difference {
-    let outputs = network.outputs();
-    let mut difference = Difference { rows: rows.len(), rms: vec![0.0; outputs], largest: vec![0.0; outputs] };
-    let Some(quantised) = model.network() else { return difference };
+    let zeros = vec![0.0; network.outputs()];
+    let mut difference = Difference { rows: rows.len(), rms: zeros.clone(), largest: zeros.clone(), correction_rms: zeros };
     let mut scratch = Scratch::new();
     for row in rows {
         let mut found = [0.0; MAX_OUTPUTS];
-        quantised.evaluate(row, &mut found, &mut scratch);
+        if let Some(quantised) = model.network() {
+            quantised.evaluate(row, &mut found, &mut scratch);
+        }
         for (index, (expected, found)) in network.evaluate(row).iter().zip(found).enumerate() {
             let error = f64::from(*expected) - f64::from(found);
             difference.rms[index] += error * error;
             difference.largest[index] = difference.largest[index].max(error.abs());
+            difference.correction_rms[index] += f64::from(*expected).powi(2);
         }
     }
     let count = rows.len().max(1) as f64;
-    difference.rms.iter_mut().for_each(|sum| *sum = (*sum / count).sqrt());
+    difference.rms.iter_mut().chain(&mut difference.correction_rms).for_each(|sum| *sum = (*sum / count).sqrt());
     difference
+}
+
+/// [`Difference`] of one output, with its name and unit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OutputComparison {
+    /// Reference channel.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// RMS difference, in the unit.
+    pub rms: f64,
+    /// Largest difference, in the unit.
+    pub largest: f64,
+    /// RMS of the float network's correction, in the unit.
+    pub correction_rms: f64,
+    /// RMS difference in percent of that; none if there is no correction.
+    pub rms_percent: Option<f64>,
+}
+
+/// [`Difference`] of every output; prints as a table.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Rows compared.
+    pub rows: usize,
+    /// In the order of the model's outputs.
+    pub outputs: Vec<OutputComparison>,
+}
+
+/// Why a model and a float network cannot be compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ComparisonError {
+    /// The model has no network lane.
+    #[error("the model file has a feedback lane only, there is no network to compare")]
+    NoNetwork,
+    /// They map between other numbers of values.
+    #[error("the float network has {found} {what}, the model file {expected}: give the network that the file was made from")]
+    Shape {
+        /// `inputs` or `outputs`.
+        what: &'static str,
+        /// The model file's.
+        expected: usize,
+        /// The float network's.
+        found: usize,
+    },
+}
+
+/// Compares a model file with the float network that it was made from, over rows of features in physical units.
+///
+/// # Errors
+/// If their shapes differ.
+pub fn compare(model: &Model<'_>, network: &FloatNetwork, rows: &[Vec<f32>]) -> Result<Comparison, ComparisonError> {
+    let card = model.card();
+    if model.network().is_none() {
+        return Err(ComparisonError::NoNetwork);
+    }
+    let shapes = [("inputs", card.features.len(), network.inputs()), ("outputs", card.outputs.len(), network.outputs())];
+    if let Some((what, expected, found)) = shapes.into_iter().find(|(_, expected, found)| expected != found) {
+        return Err(ComparisonError::Shape { what, expected, found });
+    }
+    let difference = difference(model, network, rows);
+    let outputs = card.outputs.iter().enumerate().map(|(index, output)| {
+        let channel = card.signals.reference.get(usize::from(output.channel));
+        let (rms, correction_rms) = (difference.rms[index], difference.correction_rms[index]);
+        OutputComparison {
+            name: channel.map_or("", |channel| channel.name).into(),
+            unit: channel.map_or("", |channel| channel.unit).into(),
+            rms,
+            largest: difference.largest[index],
+            correction_rms,
+            rms_percent: (correction_rms > 0.0).then(|| 100.0 * rms / correction_rms),
+        }
+    });
+    Ok(Comparison { rows: rows.len(), outputs: outputs.collect() })
+}
+
+impl fmt::Display for Comparison {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut table = Table::new();
+        table.load_style(presets::NOTHING).set_header(["output", "unit", "correction RMS", "difference RMS", "largest", "RMS %"]);
+        for output in &self.outputs {
+            table.add_row([
+                output.name.clone(),
+                output.unit.clone(),
+                format!("{:.4e}", output.correction_rms),
+                format!("{:.3e}", output.rms),
+                format!("{:.3e}", output.largest),
+                output.rms_percent.map_or("-".into(), |percent| format!("{percent:.4}")),
+            ]);
+        }
+        write!(f, "{}", table.trim_fmt())
+    }
 }

@@ -6,7 +6,11 @@
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use crate::{features::Feature, network::Activation, preview::EndRule};
+use crate::{
+    features::{Feature, Source},
+    network::Activation,
+    preview::EndRule,
+};
 
 /// Most channels in one signal.
 pub const MAX_CHANNELS: usize = 16;
@@ -85,7 +89,8 @@ pub struct Provenance<'a> {
 pub enum Interpolation {
     /// The value of the last sub-rate tick.
     Hold,
-    /// A ramp from this sub-rate tick's value to the next one's, which is evaluated a sub-rate period ahead.
+    /// A ramp from this sub-rate tick's value to the next one's, which is evaluated a sub-rate period ahead. The desired trajectory is
+    /// known there; of measured channels and past references the newest stands in, so a model that reads them is better held.
     Linear,
 }
 
@@ -106,6 +111,7 @@ pub struct Timing {
 
 /// A corrected reference channel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Output {
     /// Reference channel.
     pub channel: u8,
@@ -176,8 +182,10 @@ pub struct LaneAxis {
     pub integral_limit: f32,
 }
 
-/// Margins of the add-on's own loop, computed at design time on a model of longer memory than the one designed on.
+/// Margins of the add-on's own loop, computed at design time on a model of longer memory than the one designed on. All finite: a margin
+/// that nothing limits is `f32::MAX`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Margins {
     /// Further delay that the loop bears, ms.
     pub delay_ms: f32,
@@ -247,7 +255,9 @@ impl Card<'_> {
         let (mut past, mut future) = (self.timing.measurement_delay_ticks as u32 + 1, ahead);
         for feature in &self.features {
             let span = u32::from(feature.offset.unsigned_abs()) * divisor;
-            if feature.offset < 0 {
+            if feature.source != Source::Desired {
+                // Read from the adapter's own histories.
+            } else if feature.offset < 0 {
                 past = past.max(span);
             } else {
                 future = future.max(span + ahead);

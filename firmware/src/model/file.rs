@@ -64,6 +64,9 @@ pub fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), Refusal> {
     if version != VERSION {
         return Err(Refusal::Version { found: version });
     }
+    if header[10..12].iter().chain(&header[24..]).any(|byte| *byte != 0) {
+        return Err(Refusal::Value { what: "reserved part of the header" });
+    }
     let (card, blob, stored) = (word(12) as usize, word(16) as usize, word(20));
     let padded = (card as u64).next_multiple_of(ALIGNMENT as u64);
     let expected = HEADER as u64 + padded + blob as u64;

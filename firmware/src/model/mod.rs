@@ -5,6 +5,7 @@
 
 mod blob;
 mod card;
+mod counts;
 pub mod file;
 mod refusal;
 mod validate;
@@ -32,7 +33,7 @@ impl<'a> Model<'a> {
     /// A [`Refusal`] that names what is wrong: header, check sum, card, shapes, indices, values, probes.
     pub fn from_bytes(bytes: &'a [u8]) -> Result<Self, Refusal> {
         let (card, blob) = file::split(bytes)?;
-        let (card, rest) = postcard::take_from_bytes::<Card<'a>>(card).map_err(|_| Refusal::Card)?;
+        let (card, rest) = postcard::take_from_bytes::<Card<'a>>(card).map_err(|_| counts::refusal(card))?;
         if !rest.is_empty() {
             return Err(Refusal::Card);
         }
@@ -47,6 +48,9 @@ impl<'a> Model<'a> {
             None => None,
         };
         let envelope = blob.floats(card.envelope, 2 * card.features.len(), "envelope")?.split_at(card.features.len());
+        if envelope.0.iter().zip(envelope.1.iter()).any(|(low, high)| low > high) {
+            return Err(Refusal::Value { what: "envelope" });
+        }
         validate::probes(&card, &blob, network.as_ref(), lane.as_ref())?;
         Ok(Self { card, network, lane, envelope, checksum: file::checksum(bytes) })
     }

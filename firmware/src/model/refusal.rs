@@ -79,6 +79,13 @@ pub enum Refusal {
         /// The index.
         found: u8,
     },
+    /// An index that may occur only once.
+    Duplicate {
+        /// The field.
+        what: &'static str,
+        /// The index.
+        found: u8,
+    },
     /// An integer layer could overflow its accumulator.
     Overflow {
         /// Layer, from 0.
@@ -149,6 +156,9 @@ impl fmt::Display for Refusal {
                 write!(f, "{what} is out of its meaningful range: correct it in the description and export again")
             }
             Self::Index { what, found } => write!(f, "{what} names index {found}, which the model does not have"),
+            Self::Duplicate { what, found } => {
+                write!(f, "{what} names index {found} twice: correct it in the description and export again")
+            }
             Self::Overflow { layer } => {
                 write!(f, "layer {layer} could overflow its 32-bit accumulator: calibrate and export again")
             }

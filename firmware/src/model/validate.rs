@@ -9,6 +9,8 @@ use crate::{
 
 /// Longest look into the past or the future of one feature, in reference ticks.
 const MAX_OFFSET_TICKS: i32 = 10_000;
+/// Reference rates whose period is a useful number, Hz.
+const RATES_HZ: core::ops::RangeInclusive<f32> = 1e-3..=1e6;
 
 /// Indices, ranges and values of a card.
 pub(super) fn card(card: &Card<'_>) -> Result<(), Refusal> {
@@ -34,7 +36,7 @@ pub(super) fn card(card: &Card<'_>) -> Result<(), Refusal> {
 fn timing(card: &Card<'_>) -> Result<(), Refusal> {
     let timing = &card.timing;
     let rate = timing.reference_rate_hz;
-    if !(rate.is_finite() && rate > 0.0) {
+    if !RATES_HZ.contains(&rate) {
         return Err(Refusal::Value { what: "reference rate" });
     }
     if timing.divisor == 0 {
@@ -93,7 +95,7 @@ fn outputs(card: &Card<'_>) -> Result<(), Refusal> {
             return Err(Refusal::Index { what: "output channel", found });
         }
         if card.outputs.iter().take(index).any(|other| other.channel == found) {
-            return Err(Refusal::Index { what: "output channel named twice,", found });
+            return Err(Refusal::Duplicate { what: "output channel", found });
         }
         if !(output.limit.is_finite() && output.limit >= 0.0 && output.slew.is_finite() && output.slew > 0.0) {
             return Err(Refusal::Value { what: "output limit or slew" });
@@ -106,9 +108,17 @@ fn lane(card: &Card<'_>, lane: &LaneLayout) -> Result<(), Refusal> {
     if lane.lags == 0 || usize::from(lane.lags) > MAX_LAGS {
         return Err(Refusal::Shape { what: "lane lags", found: lane.lags.into(), limit: MAX_LAGS as u32 });
     }
-    for axis in &lane.axes {
-        if usize::from(axis.output) >= card.outputs.len() {
-            return Err(Refusal::Index { what: "lane output", found: axis.output });
+    let margins = &lane.margins;
+    if ![margins.delay_ms, margins.gain, margins.modulus].iter().all(|margin| margin.is_finite()) {
+        return Err(Refusal::NotFinite { what: "lane margins" });
+    }
+    for (index, axis) in lane.axes.iter().enumerate() {
+        let found = axis.output;
+        if usize::from(found) >= card.outputs.len() {
+            return Err(Refusal::Index { what: "lane output", found });
+        }
+        if lane.axes.iter().take(index).any(|other| other.output == found) {
+            return Err(Refusal::Duplicate { what: "lane output", found });
         }
         if axis.errors.is_empty() {
             return Err(Refusal::Shape { what: "lane errors", found: 0, limit: super::MAX_ERRORS as u32 });

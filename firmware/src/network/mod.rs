@@ -124,6 +124,9 @@ impl<'a> Network<'a> {
                 if !layout.input_code.is_finite() {
                     return Err(Refusal::NotFinite { what: "input code" });
                 }
+                if layout.input_code <= 0.0 {
+                    return Err(Refusal::Value { what: "input code" });
+                }
                 let mut layers = heapless::Vec::new();
                 for (index, layer) in layout.layers.iter().enumerate() {
                     let last = index + 1 == layout.layers.len();

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     feedback_design::DesignSettings,
     training::{FakeQuantisation, TrainingSettings},
-    trajectory::{Motion, MultisineSettings, STROKE_SPEED, SplineSettings, multisine, random_spline, stroke},
+    trajectory::{Motion, MultisineSettings, STROKE_ACCELERATION, STROKE_SPEED, SplineSettings, multisine, random_spline, stroke},
 };
 
 /// Form of a training flight.
@@ -32,11 +32,11 @@ pub struct Excitation {
     pub signal: Signal,
     /// Number of flights, each with its own seed.
     pub flights: u32,
-    /// Length of each, s.
+    /// Length of each, s (multisine and spline).
     pub seconds: f64,
     /// Peak speed, m/s.
     pub max_speed: f64,
-    /// Peak acceleration, m/s².
+    /// Peak acceleration, m/s²; that of strokes follows from the speed.
     pub max_acceleration: f64,
     /// Shortest period of a multisine, time between the points of a spline, s.
     pub shortest_s: f64,
@@ -155,30 +155,26 @@ pub struct Recipe {
 
 impl Default for Recipe {
     fn default() -> Self {
-        let excitation = |signal, max_speed, max_acceleration| Excitation {
-            signal,
-            flights: 2,
-            seconds: 90.0,
-            max_speed,
-            max_acceleration,
-            shortest_s: 0.7,
+        // Strokes are as long as they are; their acceleration follows from the speed.
+        let strokes = |speed: f64| Excitation {
+            signal: Signal::Strokes,
+            flights: 300,
+            seconds: 0.0,
+            max_speed: speed * STROKE_SPEED,
+            max_acceleration: speed * speed * STROKE_ACCELERATION,
+            shortest_s: 0.0,
         };
         Self {
-            window: [-4, 8],
-            window_step: 1,
-            divisor: 10,
+            window: [-20, 40],
+            window_step: 5,
+            divisor: 2,
             interpolation: Interpolation::Linear,
             fade_s: 0.5,
             smoothing_s: 0.06,
-            stride: 2,
-            excitations: vec![
-                excitation(Signal::Multisine, 1.7, 4.5),
-                excitation(Signal::Multisine, 2.4, 13.0),
-                excitation(Signal::Spline, 1.7, 4.5),
-                excitation(Signal::Spline, 2.4, 13.0),
-            ],
+            stride: 5,
+            excitations: vec![strokes(1.0), strokes(1.35), strokes(1.7)],
             ridge_penalty: 1e-6,
-            network: TrainingSettings { epochs: 60, learning_rate: 2e-3, ..TrainingSettings::default() },
+            network: TrainingSettings { epochs: 50, learning_rate: 2e-3, weight_decay: 0.05, ..TrainingSettings::default() },
             fine_tuning: TrainingSettings {
                 epochs: 10,
                 learning_rate: 2e-4,

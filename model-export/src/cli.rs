@@ -1,0 +1,136 @@
+//! The command line: `export`, `inspect`, `verify`.
+//!
+//! *in* arguments; *out* results on stdout, messages on stderr, an exit code; *never* a file that is half written, or a file replaced when
+//! something failed.
+
+mod export;
+mod verify;
+
+use std::{
+    ffi::OsString,
+    io::{ErrorKind, Write},
+    path::{Path, PathBuf},
+};
+
+use anyhow::{Context, Result};
+use clap::{Parser, Subcommand, ValueEnum};
+use impromptu_firmware::model::Model;
+use serde::Serialize;
+
+use crate::inspection::Inspection;
+
+/// Exit code: all is well.
+pub const FINE: u8 = 0;
+/// Exit code: a file was refused or a check failed.
+pub const FAILED: u8 = 1;
+/// Exit code: the arguments make no sense.
+pub const USAGE: u8 = 2;
+
+const EXAMPLES: &str = "\
+Exit codes: 0 fine, 1 a file was refused or a check failed, 2 wrong arguments.
+
+Examples:
+  model-export export --network out/net.safetensors --output out/net.model
+      finds out/net.json and out/net.rows.csv beside the network
+  model-export export --network net.safetensors --precision float --output net.model
+  model-export inspect net.model
+  model-export inspect net.model --format json
+  model-export verify net.model
+  model-export verify net.model --network net.safetensors --data flights.csv --max-rms-percent 1";
+
+#[derive(Debug, Parser)]
+#[command(
+    name = "model-export",
+    version,
+    about = "Float network to calibrated, quantised, checked and self-describing model file",
+    after_help = EXAMPLES
+)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Writes a model file from a float network and its description.
+    Export(export::Export),
+    /// Prints what a model file says of itself.
+    Inspect {
+        /// Model file.
+        file: PathBuf,
+        /// How to print it.
+        #[arg(long, value_enum, default_value_t)]
+        format: Format,
+    },
+    /// Re-runs a model file's probes, and compares it with the float network over rows of features.
+    Verify(verify::Verify),
+}
+
+/// How results are printed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// For people.
+    #[default]
+    Text,
+    /// One JSON document.
+    Json,
+}
+
+impl Format {
+    /// Prints a result; `text` is made only if it is wanted.
+    fn print(self, out: &mut dyn Write, result: &impl Serialize, text: impl FnOnce() -> String) -> Result<()> {
+        match self {
+            Self::Text => out.write_all(text().as_bytes())?,
+            Self::Json => writeln!(out, "{}", serde_json::to_string_pretty(result)?)?,
+        }
+        Ok(out.flush()?)
+    }
+}
+
+/// Runs the program on `arguments` (the first of them is its name). Returns the exit code.
+pub fn run<I, T>(arguments: I, out: &mut dyn Write, messages: &mut dyn Write) -> u8
+where
+    I: IntoIterator<Item = T>,
+    T: Into<OsString> + Clone,
+{
+    let arguments = match Arguments::try_parse_from(arguments) {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            // Help and version are results, everything else is a message. Nothing can be done if even that cannot be written.
+            let text = error.render();
+            let _ = if error.use_stderr() { write!(messages, "{text}") } else { write!(out, "{text}") };
+            return if error.use_stderr() { USAGE } else { FINE };
+        }
+    };
+    let outcome = match arguments.command {
+        Command::Export(export) => export.run(out).map(|()| true),
+        Command::Inspect { file, format } => inspect(&file, format, out).map(|()| true),
+        Command::Verify(verify) => verify.run(out, messages),
+    };
+    match outcome {
+        Ok(true) => FINE,
+        Ok(false) => FAILED,
+        // The reader has seen enough, `inspect … | head`.
+        Err(error) if error.downcast_ref::<std::io::Error>().is_some_and(|error| error.kind() == ErrorKind::BrokenPipe) => FINE,
+        Err(error) => {
+            let _ = writeln!(messages, "model-export: {error:#}");
+            FAILED
+        }
+    }
+}
+
+fn inspect(file: &Path, format: Format, out: &mut dyn Write) -> Result<()> {
+    let bytes = read(file)?;
+    let model = Model::from_bytes(&bytes).with_context(|| file.display().to_string())?;
+    let inspection = Inspection::new(&model, &bytes);
+    format.print(out, &inspection, || inspection.to_string())
+}
+
+fn read(path: &Path) -> Result<Vec<u8>> {
+    std::fs::read(path).with_context(|| path.display().to_string())
+}
+
+/// `NAME.safetensors` to `NAME.extension`.
+fn beside(network: &Path, extension: &str) -> PathBuf {
+    network.with_extension(extension)
+}

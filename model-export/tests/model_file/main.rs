@@ -1,0 +1,14 @@
+//! What the model file promises, and what the adapter does with the models that come out of it.
+
+mod fixture;
+
+mod command_line;
+mod damage;
+mod description;
+mod golden;
+mod refusals;
+mod round_trip;
+
+mod adapter;
+mod feedback_lane;
+mod generic_loop;

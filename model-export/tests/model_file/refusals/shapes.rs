@@ -1,0 +1,111 @@
+//! Shapes and sections.
+
+use impromptu_firmware::model::{MAX_LAGS, Refusal, Section};
+use impromptu_model_export::Precision;
+
+use super::{Case, check};
+
+#[test]
+fn shapes_and_sections() {
+    check(
+        Precision::Int8,
+        &[
+            case!(
+                "chain",
+                |c, _b| c.network.as_mut().unwrap().layers[1].inputs = 6,
+                Refusal::Shape { what: "layer inputs", found: 6, limit: 5 },
+                "layer inputs is 6"
+            ),
+            case!(
+                "first layer",
+                |c, _b| c.network.as_mut().unwrap().layers[0].inputs = 4,
+                Refusal::Shape { what: "layer inputs", .. },
+                "layer inputs is 4"
+            ),
+            case!(
+                "last layer",
+                |c, _b| c.network.as_mut().unwrap().layers[1].outputs = 3,
+                Refusal::Shape { .. },
+                "outputs of the last (linear) layer is 3"
+            ),
+            case!(
+                "no units",
+                |c, _b| c.network.as_mut().unwrap().layers[0].outputs = 0,
+                Refusal::Shape { found: 0, .. },
+                "layer outputs is 0"
+            ),
+            case!(
+                "wide",
+                |c, _b| c.network.as_mut().unwrap().layers[0].outputs = 257,
+                Refusal::Shape { found: 257, limit: 256, .. },
+                "layer outputs is 257"
+            ),
+            case!(
+                "no map",
+                |c, _b| {
+                    let n = c.network.as_mut().unwrap();
+                    n.layers.clear();
+                    n.skip = Section::default()
+                },
+                Refusal::Shape { .. },
+                "number of layers without a skip is 0"
+            ),
+            case!("no inputs", |c, _b| c.features.clear(), Refusal::Shape { .. }, "number of features is 0"),
+            case!(
+                "no outputs",
+                |c, _b| {
+                    c.lane = None;
+                    c.outputs.clear()
+                },
+                Refusal::Shape { .. },
+                "number of outputs is 0"
+            ),
+            case!("lags", |c, _b| c.lane.as_mut().unwrap().lags = MAX_LAGS as u8 + 1, Refusal::Shape { .. }, "lane lags is 33"),
+            case!("no lags", |c, _b| c.lane.as_mut().unwrap().lags = 0, Refusal::Shape { .. }, "lane lags is 0"),
+            case!(
+                "no errors",
+                |c, _b| c.lane.as_mut().unwrap().axes[0].errors.clear(),
+                Refusal::Shape { .. },
+                "lane errors is 0"
+            ),
+            case!(
+                "length",
+                |c, _b| c.network.as_mut().unwrap().layers[0].weights.length -= 8,
+                Refusal::SectionLength { expected: 24, found: 16, .. },
+                "section layer weights has 16 bytes"
+            ),
+            case!(
+                "multipliers",
+                |c, _b| c.network.as_mut().unwrap().layers[0].requantisation.length = 0,
+                Refusal::SectionLength { .. },
+                "section layer multipliers"
+            ),
+            case!(
+                "lane length",
+                |c, _b| c.lane.as_mut().unwrap().axes[0].coefficients.length += 4,
+                Refusal::SectionLength { .. },
+                "section lane coefficients"
+            ),
+            case!("envelope length", |c, _b| c.envelope.length = 0, Refusal::SectionLength { .. }, "section envelope"),
+            case!("probe count", |c, _b| c.probes.count = 5, Refusal::SectionLength { .. }, "section network probes"),
+            case!(
+                "alignment",
+                |c, _b| c.network.as_mut().unwrap().layers[0].weights.offset += 4,
+                Refusal::SectionAlignment { .. },
+                "section layer weights is not aligned"
+            ),
+            case!(
+                "range",
+                |c, _b| c.network.as_mut().unwrap().skip.offset = 16 << 16,
+                Refusal::SectionRange { .. },
+                "section skip weights lies outside"
+            ),
+            case!(
+                "end of the address space",
+                |c, _b| c.envelope.offset = u32::MAX - 15,
+                Refusal::SectionRange { .. },
+                "section envelope lies outside"
+            ),
+        ],
+    );
+}
