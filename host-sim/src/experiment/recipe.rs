@@ -9,7 +9,9 @@ use serde::{Deserialize, Serialize};
 use crate::{
     feedback_design::DesignSettings,
     training::{FakeQuantisation, TrainingSettings},
-    trajectory::{Motion, MultisineSettings, STROKE_ACCELERATION, STROKE_SPEED, SplineSettings, multisine, random_spline, stroke},
+    trajectory::{
+        Motion, MultisineSettings, STROKE_ACCELERATION, STROKE_SPEED, SplineSettings, multisine, random_spline, stroke,
+    },
 };
 
 /// Form of a training flight.
