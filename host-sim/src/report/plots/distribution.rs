@@ -16,23 +16,24 @@ pub(in crate::report) fn error_distribution(
     methods: &[Method],
     flights: &[PerFlight],
 ) -> anyhow::Result<Option<Markup>> {
-    let mut lines: Vec<(Method, Vec<f64>)> = Vec::new();
+    let mut lines: Vec<(Method, usize, Vec<f64>)> = Vec::new();
     for method in methods {
         let mut errors: Vec<f64> = case
             .flights(flights, *method)
             .iter()
             .map(|flight| flight.rms_cm)
             .collect();
+        let flown = errors.len();
         errors.retain(|error| error.is_finite() && *error > 0.0);
         errors.sort_by(f64::total_cmp);
-        if !errors.is_empty() {
-            lines.push((*method, errors));
+        if flown > 0 {
+            lines.push((*method, flown, errors));
         }
     }
     let Some(span) = span(
         lines
             .iter()
-            .flat_map(|(_, errors)| errors)
+            .flat_map(|(_, _, errors)| errors)
             .map(|error| error.log10()),
     ) else {
         return Ok(None);
@@ -54,9 +55,11 @@ pub(in crate::report) fn error_distribution(
             &decades(low, high),
             "RMS error of a flight [cm], log scale",
         )?;
-        for (line, (method, errors)) in lines.iter().enumerate() {
-            let worst = errors[errors.len() - 1];
-            chart.names(area, line, *method, &format!("{} cm", centimetres(worst)))?;
+        for (line, (method, flown, errors)) in lines.iter().enumerate() {
+            chart.names(area, line, *method, &figure(*flown, errors))?;
+            let Some(worst) = errors.last() else {
+                continue;
+            };
             let colour = ink(*method);
             for (i, error) in errors.iter().enumerate() {
                 // Neighbours in size are moved apart in a fixed pattern.
@@ -68,7 +71,8 @@ pub(in crate::report) fn error_distribution(
                     colour.colour().mix(0.55).filled(),
                 ))?;
             }
-            let median = chart.x(errors[errors.len() / 2].log10());
+            let middle = 0.5 * (errors[(errors.len() - 1) / 2] + errors[errors.len() / 2]);
+            let median = chart.x(middle.log10());
             let bar = vec![
                 (median, chart.y(line, -0.36)),
                 (median, chart.y(line, 0.36)),
@@ -81,6 +85,14 @@ pub(in crate::report) fn error_distribution(
         Ok(())
     })
     .map(Some)
+}
+
+/// The worst of the sorted errors, or how many of the flights have none that can be drawn.
+fn figure(flown: usize, errors: &[f64]) -> String {
+    match errors.last() {
+        Some(worst) if errors.len() == flown => format!("{} cm", centimetres(*worst)),
+        _ => format!("{} of {flown} n/a", flown - errors.len()),
+    }
 }
 
 /// Ticks at 1, 2 and 5 times the powers of ten (powers alone when there are many), between two logarithms.
@@ -111,6 +123,13 @@ fn value_label(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_crashed_flight_is_counted_not_dropped() {
+        assert_eq!(figure(2, &[0.5, 4.0]), "4.00 cm");
+        assert_eq!(figure(30, &[0.5; 29]), "1 of 30 n/a");
+        assert_eq!(figure(3, &[]), "3 of 3 n/a");
+    }
 
     #[test]
     fn ticks_are_round_numbers() {

@@ -139,11 +139,11 @@ mod tests {
             .collect();
         assert_eq!(View::of(&flat), Some(View::Plane(0, 2)));
         let helix: Vec<[f64; 3]> = (0..9)
-            .map(|i| f64::from(i))
+            .map(f64::from)
             .map(|t| [t.cos(), t.sin(), 0.2 * t])
             .collect();
         assert_eq!(View::of(&helix), Some(View::Isometric));
         assert_eq!(View::of(&[[f64::NAN; 3]]), None);
-        assert!(scored(&flat, &(20..3)).is_empty());
+        assert!(scored(&flat, &Range { start: 20, end: 3 }).is_empty());
     }
 }
