@@ -74,7 +74,7 @@ fn numbers_that_are_not_finite_are_shown_as_not_available() {
     for trace in &mut results.flights {
         trace.flown.fill([f64::NAN; 3]);
         trace.desired.truncate(3);
-        trace.scored = 5..1;
+        trace.scored = std::ops::Range { start: 5, end: 1 };
         trace.rate_hz = f64::NAN;
     }
     let page = render_html(&results).unwrap();
