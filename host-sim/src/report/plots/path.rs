@@ -52,14 +52,8 @@ impl View {
     fn labels(self) -> Labels<'static> {
         const NAMES: [&str; 3] = ["x [m]", "y [m]", "z [m]"];
         match self {
-            Self::Plane(across, up) => Labels {
-                x: NAMES[across],
-                y: NAMES[up],
-            },
-            Self::Isometric => Labels {
-                x: "isometric, right [m]",
-                y: "isometric, up [m]",
-            },
+            Self::Plane(across, up) => Labels { x: NAMES[across], y: NAMES[up] },
+            Self::Isometric => Labels { x: "isometric, right [m]", y: "isometric, up [m]" },
         }
     }
 }
@@ -71,37 +65,22 @@ pub(in crate::report) fn path_in_space(scene: &Scene<'_>) -> anyhow::Result<Opti
         return Ok(None);
     };
     let desired = view.project(scored(&first.desired, &first.scored));
-    let baseline = scene
-        .baseline()
-        .map(|trace| view.project(scored(&trace.flown, &trace.scored)));
-    let add_on = scene
-        .add_on()
-        .map(|trace| view.project(scored(&trace.flown, &trace.scored)));
+    let baseline = scene.baseline().map(|trace| view.project(scored(&trace.flown, &trace.scored)));
+    let add_on = scene.add_on().map(|trace| view.project(scored(&trace.flown, &trace.scored)));
 
-    let all = || {
-        [Some(&desired), baseline.as_ref(), add_on.as_ref()]
-            .into_iter()
-            .flatten()
-            .flatten()
-    };
-    let (Some(x), Some(y)) = (
-        span(all().map(|point| point.0)),
-        span(all().map(|point| point.1)),
-    ) else {
+    let all = || [Some(&desired), baseline.as_ref(), add_on.as_ref()].into_iter().flatten().flatten();
+    let (Some(x), Some(y)) = (span(all().map(|point| point.0)), span(all().map(|point| point.1))) else {
         return Ok(None);
     };
     // One metre is as long across as it is up.
     let (width, height) = inner_size(SIZE);
-    let metres_per_pixel = ((x.end - x.start) / width)
-        .max((y.end - y.start) / height)
-        .max(1e-6);
+    let metres_per_pixel = ((x.end - x.start) / width).max((y.end - y.start) / height).max(1e-6);
     let (x, y) = (
         about_centre(&widened(&x, 0.0, 1e-6), 1.08 * metres_per_pixel * width),
         about_centre(&widened(&y, 0.0, 1e-6), 1.08 * metres_per_pixel * height),
     );
 
-    let description =
-        "Path over the scored part of the flight: desired, baseline and with the add-on.";
+    let description = "Path over the scored part of the flight: desired, baseline and with the add-on.";
     let drawn = panel(SIZE, &first.trajectory, description, |area| {
         let mut chart = axes(area, x, y, &view.labels())?;
         curve(&mut chart, &desired, Ink::Desired.line(5.0))?;
@@ -123,9 +102,7 @@ fn about_centre(span: &Range<f64>, length: f64) -> Range<f64> {
 
 /// The scored samples, however wrong the range is.
 fn scored<'a>(points: &'a [[f64; 3]], range: &Range<usize>) -> &'a [[f64; 3]] {
-    points
-        .get(range.start..range.end.min(points.len()))
-        .unwrap_or(&[])
+    points.get(range.start..range.end.min(points.len())).unwrap_or(&[])
 }
 
 #[cfg(test)]
@@ -134,14 +111,9 @@ mod tests {
 
     #[test]
     fn a_flat_path_is_seen_from_the_front_and_a_helix_from_above() {
-        let flat: Vec<[f64; 3]> = (0..9)
-            .map(|i| [f64::from(i), 0.01, f64::from(i * i)])
-            .collect();
+        let flat: Vec<[f64; 3]> = (0..9).map(|i| [f64::from(i), 0.01, f64::from(i * i)]).collect();
         assert_eq!(View::of(&flat), Some(View::Plane(0, 2)));
-        let helix: Vec<[f64; 3]> = (0..9)
-            .map(f64::from)
-            .map(|t| [t.cos(), t.sin(), 0.2 * t])
-            .collect();
+        let helix: Vec<[f64; 3]> = (0..9).map(f64::from).map(|t| [t.cos(), t.sin(), 0.2 * t]).collect();
         assert_eq!(View::of(&helix), Some(View::Isometric));
         assert_eq!(View::of(&[[f64::NAN; 3]]), None);
         assert!(scored(&flat, &Range { start: 20, end: 3 }).is_empty());
