@@ -3,14 +3,19 @@
 //! *in* a [`Recipe`] and a [`Loop`]; *out* models and [`crate::report::Results`]; *never* a choice made on the test flights;
 //! *source* Zhou 2017, section V; Li 2017 (30 unseen strokes).
 
+mod build;
+pub mod demo;
+mod evaluation;
 mod flights;
 mod lane;
 mod learn;
 mod models;
 mod recipe;
 
+pub use build::{BuildError, Built, Purpose, build, derived, smoothing, training_logs, validation_strokes};
+pub use evaluation::{EvaluationError, evaluate, model_card, traces};
 pub use flights::{FlightsError, Loop, reduction};
-pub use lane::{LaneChoice, LaneRefusal, choose_lane, dithered_logs};
+pub use lane::{LaneChoice, LaneRefusal, choose_lane, dithered_logs, strongest_lane};
 pub use learn::{LearnError, Learned, learn};
 pub use models::{ModelSet, describe, feedforward};
 pub use recipe::{Excitation, LaneRecipe, Recipe, Signal};

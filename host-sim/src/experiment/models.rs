@@ -33,7 +33,7 @@ const LIMIT_FACTOR: f32 = 1.5;
 const SLEW_TICKS: f32 = 5.0;
 
 impl ModelSet {
-    /// Encodes all models of a loop, each with the feedback lane if there is one.
+    /// Encodes all models of a loop, each with the feedback lane if there is one; the feed-forward has a lane of its own.
     ///
     /// # Errors
     /// If a model cannot be encoded.
@@ -42,13 +42,14 @@ impl ModelSet {
         plant: &Loop,
         learned: &Learned,
         lane: Option<&LaneDescription>,
+        feedforward_lane: Option<&LaneDescription>,
         remarks: &str,
         seed: u64,
     ) -> Result<Self, ExportError> {
-        let describe = |name: &str| describe(recipe, plant, learned, lane, name, remarks, seed);
-        let feedforward = feedforward(&plant.settings, describe("feedforward"))?;
+        let describe = |name: &str, lane| describe(recipe, plant, learned, lane, name, remarks, seed);
+        let feedforward = feedforward(&plant.settings, describe("feedforward", feedforward_lane))?;
         let make = |name: &str, network: &FloatNetwork, precision| {
-            encode(&describe(name), Some(network), precision, &learned.calibration)
+            encode(&describe(name, lane), Some(network), precision, &learned.calibration)
         };
         Ok(Self {
             feedforward,
