@@ -77,6 +77,8 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
     correction: [f32; MAX_OUTPUTS],
     saturations: u32,
     loop_gain: f32,
+    /// Recent peak of what is desired of the loop ([`crate::model::Authority`]).
+    vigour: f32,
     scratch: Scratch,
 }
 
@@ -113,6 +115,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             correction: [0.0; MAX_OUTPUTS],
             saturations: 0,
             loop_gain: 1.0,
+            vigour: 0.0,
             scratch: Scratch::new(),
         })
     }
@@ -252,6 +255,17 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         outputs.map(finite_or_zero)
     }
 
+    /// Share of the fast clamps that the feedback lane may use at this tick.
+    fn authority<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>) -> f32 {
+        let Some(layout) = &self.model.card().lane else { return 1.0 };
+        let authority = &layout.authority;
+        let values = authority.channels.iter().map(|&channel| preview.channel(tick, usize::from(channel)));
+        let now = finite_or_zero(values.fold(0.0, |sum, value| sum + value * value));
+        let past = self.vigour * authority.decay;
+        self.vigour = if now > past { now } else { past };
+        1.0 / (1.0 + self.vigour / (authority.scale * authority.scale))
+    }
+
     /// The feedback lane's output on each of its axes.
     fn feedback<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M]) -> [f32; MAX_AXES] {
         let mut outputs = [0.0; MAX_AXES];
@@ -261,6 +275,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         let whole = timing.measurement_delay_ticks as i32;
         let share = timing.measurement_delay_ticks - whole as f32;
         let engaged = self.lanes.feedback && self.feedback_weight > 0.0;
+        let authority = self.authority(tick, preview);
         for ((axis, state), output) in lane.axes().iter().zip(&mut self.axes).zip(&mut outputs) {
             let mut errors = [0.0; MAX_ERRORS];
             for (error, &(measured_channel, desired_channel)) in errors.iter_mut().zip(&axis.layout().errors) {
@@ -270,7 +285,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
                 let then = newer + (older - newer) * share;
                 *error = measured.get(usize::from(measured_channel)).copied().unwrap_or(then) - then;
             }
-            *output = state.step(lane, axis, errors, dt, engaged);
+            *output = state.step(lane, axis, errors, authority, dt, engaged);
         }
         outputs
     }

@@ -97,9 +97,17 @@ impl AxisState {
     }
 
     /// Takes this tick's errors (in the order of the layout) and returns the lane's output on this axis.
-    /// `dt` is the reference's period, s. While not `engaged` the lags stay warm and the integral stands still: a lane that is faded
+    /// `authority` (0..=1) scales the fast clamp; `dt` is the reference's period, s. While not `engaged` the lags stay warm and the integral stands still: a lane that is faded
     /// out must not lose its slow part at once; [`AxisState::release`] empties it afterwards.
-    pub fn step(&mut self, lane: &Lane<'_>, axis: &Axis<'_>, errors: [f32; MAX_ERRORS], dt: f32, engaged: bool) -> f32 {
+    pub fn step(
+        &mut self,
+        lane: &Lane<'_>,
+        axis: &Axis<'_>,
+        errors: [f32; MAX_ERRORS],
+        authority: f32,
+        dt: f32,
+        engaged: bool,
+    ) -> f32 {
         let lags = lane.lags;
         for (lagged, error) in self.errors.iter_mut().zip(errors) {
             push(lagged, lags, finite_or_zero(error));
@@ -114,7 +122,8 @@ impl AxisState {
             fast += dot(these, lagged, 0.0);
         }
         fast += dot(axis.outputs, &self.outputs, slow);
-        let bounded = clamp(fast, -layout.fast_limit, layout.fast_limit);
+        let fast_limit = layout.fast_limit * authority;
+        let bounded = clamp(fast, -fast_limit, fast_limit);
         self.clamped = bounded != fast;
         let increment = self.errors[0][0] * dt;
         // Only its own clamp stops the integral: a constant disturbance larger than the fast clamp must still be absorbed. The integral
@@ -173,7 +182,7 @@ pub fn probe(lane: &Lane<'_>, dt: f32) -> [f32; MAX_AXES] {
     for (axis, result) in lane.axes.iter().zip(&mut results) {
         let mut state = AxisState::REST;
         for _ in 0..PROBE_TICKS {
-            *result = state.step(lane, axis, core::array::from_fn(|_| draw()), dt, true);
+            *result = state.step(lane, axis, core::array::from_fn(|_| draw()), 1.0, dt, true);
             state.applied(lane, *result);
         }
     }

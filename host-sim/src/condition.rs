@@ -59,7 +59,7 @@ impl Condition {
     #[must_use]
     pub fn delayed(&self, seconds: f64) -> Self {
         Self {
-            name: format!("{}+{:.0}ms", self.name, seconds * 1e3),
+            name: if seconds > 0.0 { format!("{}+{:.0}ms", self.name, seconds * 1e3) } else { self.name.clone() },
             command_delay_s: self.command_delay_s + seconds,
             ..self.clone()
         }

@@ -108,12 +108,34 @@ pub struct LaneAxisDescription {
     pub integral_limit: f32,
 }
 
+/// Authority of the lane over its fast clamps: see [`model::Authority`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AuthorityDescription {
+    /// Desired channels; none: full authority always.
+    pub channels: Vec<u8>,
+    /// Magnitude of the channels at which half of the clamp is left, in their unit.
+    pub scale: f32,
+    /// Factor on the recent peak in a reference tick, 0..1.
+    pub decay: f32,
+}
+
+impl Default for AuthorityDescription {
+    /// Full authority always.
+    fn default() -> Self {
+        Self { channels: Vec::new(), scale: 1.0, decay: 0.0 }
+    }
+}
+
 /// The feedback lane.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LaneDescription {
     /// Axes.
     pub axes: Vec<LaneAxisDescription>,
+    /// Authority over the fast clamps.
+    #[serde(default)]
+    pub authority: AuthorityDescription,
     /// Worst margins over the axes.
     pub margins: model::Margins,
 }

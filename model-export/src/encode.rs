@@ -3,8 +3,8 @@
 use impromptu_firmware::{
     feedback,
     model::{
-        self, Arithmetic, Card, Channel, LaneAxis, LaneLayout, LayerLayout, Model, NetworkLayout, Probes, Refusal, Section,
-        SignalTable, file,
+        self, Arithmetic, Authority, Card, Channel, LaneAxis, LaneLayout, LayerLayout, Model, NetworkLayout, Probes, Refusal,
+        Section, SignalTable, file,
     },
     network::{self, ROWS, Scratch},
 };
@@ -195,7 +195,12 @@ fn lane(description: &Description, blob: &mut BlobWriter) -> Result<Option<LaneL
             integral_limit: axis.integral_limit,
         });
     }
-    Ok(Some(LaneLayout { lags: lags as u8, axes: bounded(&axes, "lane axes")?, margins: lane.margins }))
+    let authority = Authority {
+        channels: bounded(&lane.authority.channels, "lane authority channels")?,
+        scale: lane.authority.scale,
+        decay: lane.authority.decay,
+    };
+    Ok(Some(LaneLayout { lags: lags as u8, axes: bounded(&axes, "lane axes")?, authority, margins: lane.margins }))
 }
 
 /// The bytes of a model file. `calibration` are rows of features in physical units: ranges of the integer network and probes come from

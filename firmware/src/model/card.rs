@@ -195,6 +195,19 @@ pub struct Margins {
     pub modulus: f32,
 }
 
+/// How much of the fast clamps the lane may use: 1 / (1 + v / scale²), where v is the recent peak of Σ channel², which decays by
+/// `decay` each tick. The lane is linear round calm flight; where much is desired of the loop it must not pull as hard.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Authority {
+    /// Desired channels, for example the accelerations; none: full authority always.
+    pub channels: Vec<u8, MAX_AXES>,
+    /// Magnitude of the channels at which half of the clamp is left, in their unit.
+    pub scale: f32,
+    /// Factor on the recent peak in a reference tick, 0..1.
+    pub decay: f32,
+}
+
 /// The feedback lane.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LaneLayout {
@@ -202,6 +215,8 @@ pub struct LaneLayout {
     pub lags: u8,
     /// Axes.
     pub axes: Vec<LaneAxis, MAX_AXES>,
+    /// Authority over the fast clamps.
+    pub authority: Authority,
     /// Worst margins over the axes.
     pub margins: Margins,
 }

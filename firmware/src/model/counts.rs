@@ -12,8 +12,8 @@ use serde::{
 };
 
 use super::{
-    Arithmetic, Channel, LayerLayout, MAX_AXES, MAX_CHANNELS, MAX_ERRORS, MAX_FEATURES, MAX_LAYERS, MAX_OUTPUTS, Margins, Output,
-    Provenance, Refusal, Section, Timing,
+    Arithmetic, Authority, Channel, LayerLayout, MAX_AXES, MAX_CHANNELS, MAX_ERRORS, MAX_FEATURES, MAX_LAYERS, MAX_OUTPUTS,
+    Margins, Output, Provenance, Refusal, Section, Timing,
 };
 use crate::features::Feature;
 
@@ -97,6 +97,7 @@ struct Axis {
 struct Lane {
     _lags: u8,
     axes: Count<Axis>,
+    _authority: Authority,
     _margins: Margins,
 }
 

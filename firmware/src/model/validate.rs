@@ -112,6 +112,13 @@ fn lane(card: &Card<'_>, lane: &LaneLayout) -> Result<(), Refusal> {
     if ![margins.delay_ms, margins.gain, margins.modulus].iter().all(|margin| margin.is_finite()) {
         return Err(Refusal::NotFinite { what: "lane margins" });
     }
+    let authority = &lane.authority;
+    if let Some(&found) = authority.channels.iter().find(|&&channel| usize::from(channel) >= card.signals.desired.len()) {
+        return Err(Refusal::Index { what: "lane authority channel", found });
+    }
+    if !(authority.scale.is_finite() && authority.scale > 0.0 && authority.decay >= 0.0 && authority.decay < 1.0) {
+        return Err(Refusal::Value { what: "lane authority" });
+    }
     for (index, axis) in lane.axes.iter().enumerate() {
         let found = axis.output;
         if usize::from(found) >= card.outputs.len() {

@@ -96,7 +96,8 @@ struct Outcome {
 pub fn run(settings: &DemoSettings, observer: &dyn Observer) -> anyhow::Result<Results> {
     let started = Instant::now();
     let cases = cases(settings)?;
-    let epochs = (settings.recipe.network.epochs + settings.recipe.fine_tuning.epochs + 2) as u64;
+    let trainings = settings.recipe.weight_decays.len();
+    let epochs = ((settings.recipe.network.epochs + 1) * trainings + settings.recipe.fine_tuning.epochs + 1) as u64;
     let tests = settings.speeds.len() as u64 + 1;
     let (done, of) = (AtomicU64::new(0), cases.len() as u64 * (epochs + 3 * tests));
     let advance = |steps: u64| observer.steps(done.fetch_add(steps, Ordering::Relaxed) + steps, of);
@@ -217,7 +218,7 @@ fn folder(out: &Path, name: &str) -> anyhow::Result<PathBuf> {
 /// The flashed model of a loop, with the float network, its description and the calibration rows beside it.
 fn write_models(out: &Path, settings: &DemoSettings, plant: &Loop, built: &Built, seed: u64) -> anyhow::Result<()> {
     let lane = built.lane.as_ref().ok().map(|choice| &choice.lane);
-    let description = describe(&settings.recipe, plant, &built.learned, lane, "net", "", seed);
+    let description = describe(&settings.recipe, plant, &built.learned.rows, lane, "net", "", seed);
     let stem = folder(out, "models")?.join(format!("{}-{}-{}-seed{seed}", plant.vehicle.name, plant.gains, plant.condition.name));
     let write = |extension: &str, bytes: &[u8]| {
         let path = PathBuf::from(format!("{}.{extension}", stem.display()));

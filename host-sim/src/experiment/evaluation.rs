@@ -137,7 +137,7 @@ pub fn model_card(built: &Built, plant: &Loop) -> Result<ModelCard, ExportError>
     let network = &built.learned.quantised;
     let dense: usize = network.layers.iter().map(|layer| layer.weights.len() + layer.bias.len()).sum();
     let skip = network.skip.as_ref().map_or(0, Vec::len);
-    let difference = verify::difference(&model, network, &built.learned.calibration);
+    let difference = verify::difference(&model, network, &built.learned.rows.calibration);
     let position = &difference.rms[..3.min(difference.rms.len())];
     let square = position.iter().map(|rms| rms * rms).sum::<f64>();
     let lane_parameters = model.lane().map_or(0, |lane| lane.multiply_adds());

@@ -7,7 +7,7 @@ use super::recipe::Recipe;
 use crate::{
     examples::{ExampleSettings, examples},
     flight_log::FlightLog,
-    training::{Dataset, DatasetError, Progress, Ridge, RidgeError, TrainingError, fine_tune, train},
+    training::{Dataset, DatasetError, Progress, Ridge, RidgeError, TrainingError, TrainingSettings, fine_tune, train},
 };
 
 /// Why nothing was learned.
@@ -22,6 +22,9 @@ pub enum LearnError {
     /// The training failed.
     #[error("network: {0}")]
     Training(#[from] TrainingError),
+    /// The recipe asks for no network.
+    #[error("recipe: `weight_decays` and `shares` name no candidate; give at least one of each")]
+    NoCandidate,
     /// Too few logs.
     #[error("at least two logs are needed: one is kept to decide when to stop training")]
     OneLog,
@@ -36,6 +39,19 @@ pub struct Learned {
     pub network: FloatNetwork,
     /// The same after fine-tuning with int8 weights imitated.
     pub quantised: FloatNetwork,
+    /// What a description needs of the training rows.
+    pub rows: Rows,
+}
+
+/// Rows of calibration that are kept.
+const CALIBRATION_ROWS: usize = 512;
+
+/// A choice among networks: called with the ridge regression and the candidates, answers with a candidate's index.
+pub type Judge<'a> = dyn Fn(&FloatNetwork, &[FloatNetwork], &Rows) -> usize + 'a;
+
+/// What a description needs of the training rows.
+#[derive(Clone, Debug)]
+pub struct Rows {
     /// Rows of features for calibration and probes.
     pub calibration: Vec<Vec<f32>>,
     /// Smallest and largest value of each feature.
@@ -45,13 +61,11 @@ pub struct Learned {
     /// CRC-32 of all rows.
     pub data_crc: u32,
     /// Number of rows.
-    pub rows: usize,
+    pub count: usize,
 }
 
-/// Rows of calibration that are kept.
-const CALIBRATION_ROWS: usize = 512;
-
-/// Learns from logs of the baseline; every fourth log is kept for validation.
+/// Learns from logs of the baseline; every fourth log is kept to decide when a training has been long enough. `judge` chooses between
+/// the recipe's candidates, which should be done in flight.
 ///
 /// # Errors
 /// If the logs hold too little or the training fails.
@@ -60,6 +74,7 @@ pub fn learn(
     logs: &[FlightLog],
     measurement_delay_s: f64,
     smoothing_s: f64,
+    judge: &Judge<'_>,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Learned, LearnError> {
     if logs.len() < 2 {
@@ -73,19 +88,33 @@ pub fn learn(
     };
     let training = examples(&pick(false), &features, &settings)?;
     let validation = examples(&pick(true), &features, &settings)?;
-    let ridge = Ridge::fit(&training, recipe.ridge_penalty)?.to_network();
-    let network = train(&recipe.network, &training, &validation, progress)?.network;
-    let quantised = fine_tune(&network, &recipe.fine_tuning, &training, &validation, progress)?.network;
-    Ok(Learned {
-        ridge,
-        network,
-        quantised,
+    let rows = Rows {
         calibration: calibration(&training),
         envelope: envelope(&training),
         label_range: label_range(&training),
         data_crc: data_crc(&training),
-        rows: training.rows(),
-    })
+        count: training.rows(),
+    };
+    let ridge = Ridge::fit(&training, recipe.ridge_penalty)?.to_network();
+    let mut candidates = Vec::new();
+    for &weight_decay in &recipe.weight_decays {
+        let settings = TrainingSettings { weight_decay, ..recipe.network.clone() };
+        let network = train(&settings, &training, &validation, progress)?.network;
+        candidates.extend(recipe.shares.iter().map(|&share| shared(&network, share)));
+    }
+    let chosen = judge(&ridge, &candidates, &rows).min(candidates.len().saturating_sub(1));
+    let network = candidates.into_iter().nth(chosen).ok_or(LearnError::NoCandidate)?;
+    let quantised = fine_tune(&network, &recipe.fine_tuning, &training, &validation, progress)?.network;
+    Ok(Learned { ridge, network, quantised, rows })
+}
+
+/// The network with `share` of what its layers add to the skip.
+fn shared(network: &FloatNetwork, share: f32) -> FloatNetwork {
+    let mut network = network.clone();
+    if let Some(last) = network.layers.last_mut() {
+        last.weights.iter_mut().chain(&mut last.bias).for_each(|value| *value *= share);
+    }
+    network
 }
 
 fn calibration(data: &Dataset) -> Vec<Vec<f32>> {

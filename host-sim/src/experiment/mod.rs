@@ -16,6 +16,6 @@ pub use build::{BuildError, Built, Purpose, build, derived, smoothing, training_
 pub use evaluation::{EvaluationError, evaluate, model_card, traces};
 pub use flights::{FlightsError, Loop, reduction};
 pub use lane::{LaneChoice, LaneRefusal, choose_lane, dithered_logs, strongest_lane};
-pub use learn::{LearnError, Learned, learn};
+pub use learn::{Judge, LearnError, Learned, Rows, learn};
 pub use models::{ModelSet, describe, feedforward};
 pub use recipe::{Excitation, LaneRecipe, Recipe, Signal};

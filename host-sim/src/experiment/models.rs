@@ -12,7 +12,11 @@ use impromptu_model_export::{
     encode,
 };
 
-use super::{flights::Loop, learn::Learned, recipe::Recipe};
+use super::{
+    flights::Loop,
+    learn::{Learned, Rows},
+    recipe::Recipe,
+};
 
 /// The models that an experiment compares, as the bytes of model files.
 #[derive(Clone, Debug)]
@@ -46,10 +50,10 @@ impl ModelSet {
         remarks: &str,
         seed: u64,
     ) -> Result<Self, ExportError> {
-        let describe = |name: &str, lane| describe(recipe, plant, learned, lane, name, remarks, seed);
+        let describe = |name: &str, lane| describe(recipe, plant, &learned.rows, lane, name, remarks, seed);
         let feedforward = feedforward(&plant.settings, describe("feedforward", feedforward_lane))?;
         let make = |name: &str, network: &FloatNetwork, precision| {
-            encode(&describe(name, lane), Some(network), precision, &learned.calibration)
+            encode(&describe(name, lane), Some(network), precision, &learned.rows.calibration)
         };
         Ok(Self {
             feedforward,
@@ -61,12 +65,12 @@ impl ModelSet {
 }
 
 /// Largest correction and slew of each reference channel.
-fn outputs(learned: &Learned, lane: Option<&LaneDescription>) -> Vec<Output> {
+fn outputs(rows: &Rows, lane: Option<&LaneDescription>) -> Vec<Output> {
     let feedback =
         lane.map_or(0.0, |lane| lane.axes.iter().map(|axis| axis.fast_limit + axis.integral_limit).fold(0.0, f32::max));
     (0..REFERENCE)
         .map(|channel| {
-            let limit = LIMIT_FACTOR * learned.label_range[channel] + if channel < 3 { feedback } else { 0.0 };
+            let limit = LIMIT_FACTOR * rows.label_range[channel] + if channel < 3 { feedback } else { 0.0 };
             Output { channel: channel as u8, limit, slew: limit / SLEW_TICKS }
         })
         .collect()
@@ -76,7 +80,7 @@ fn outputs(learned: &Learned, lane: Option<&LaneDescription>) -> Vec<Output> {
 pub fn describe(
     recipe: &Recipe,
     plant: &Loop,
-    learned: &Learned,
+    rows: &Rows,
     lane: Option<&LaneDescription>,
     name: &str,
     remarks: &str,
@@ -90,7 +94,7 @@ pub fn describe(
             condition: plant.condition.name.clone(),
             software: format!("host-sim {}", env!("CARGO_PKG_VERSION")),
             seed,
-            data_crc: learned.data_crc,
+            data_crc: rows.data_crc,
             remarks: remarks.into(),
         },
         signals: Signals::from(&quadrotor::signals()),
@@ -102,8 +106,8 @@ pub fn describe(
             fade_s: recipe.fade_s as f32,
         },
         features: recipe.features(),
-        outputs: outputs(learned, lane),
-        envelope: learned.envelope.clone(),
+        outputs: outputs(rows, lane),
+        envelope: rows.envelope.clone(),
         lane: lane.cloned(),
     }
 }

@@ -92,6 +92,10 @@ pub struct LaneRecipe {
     pub noise_factors: Vec<f64>,
     /// Clamps of the fast part tried, m.
     pub fast_limits: Vec<f64>,
+    /// Desired accelerations at which half of the fast clamp is left, tried, m/s².
+    pub authority_scales: Vec<f64>,
+    /// Decay of the recent peak of the desired acceleration in a reference tick.
+    pub authority_decay: f64,
     /// Clamp of the integral part, m.
     pub integral_limit: f64,
     /// Everything else of the design.
@@ -113,8 +117,10 @@ impl Default for LaneRecipe {
             dither_hold_s: 0.05,
             efforts: vec![6e-3, 1.2e-2, 3e-2],
             velocity_weights: vec![0.05, 0.2],
-            noise_factors: vec![2.0, 4.0],
-            fast_limits: vec![0.05, 0.1, 0.15],
+            noise_factors: vec![2.0, 3.0],
+            fast_limits: vec![0.1, 0.15],
+            authority_scales: vec![20.0],
+            authority_decay: 0.97,
             integral_limit: 0.3,
             design: DesignSettings::default(),
         }
@@ -145,6 +151,10 @@ pub struct Recipe {
     pub ridge_penalty: f64,
     /// Training of the network on what the ridge regression leaves.
     pub network: TrainingSettings,
+    /// Weight decays tried in its place.
+    pub weight_decays: Vec<f64>,
+    /// Factors tried on what the network adds to the ridge regression.
+    pub shares: Vec<f32>,
     /// Fine-tuning with int8 weights imitated.
     pub fine_tuning: TrainingSettings,
     /// Feedback lane.
@@ -176,7 +186,9 @@ impl Default for Recipe {
             stride: 5,
             excitations: vec![strokes(1.0), strokes(1.35), strokes(1.7)],
             ridge_penalty: 1e-6,
-            network: TrainingSettings { epochs: 50, learning_rate: 2e-3, weight_decay: 0.05, ..TrainingSettings::default() },
+            network: TrainingSettings { epochs: 30, learning_rate: 2e-3, ..TrainingSettings::default() },
+            weight_decays: vec![0.03, 0.2],
+            shares: vec![1.0, 0.85, 0.7],
             fine_tuning: TrainingSettings {
                 epochs: 10,
                 learning_rate: 2e-4,
@@ -184,7 +196,7 @@ impl Default for Recipe {
                 ..TrainingSettings::default()
             },
             lane: LaneRecipe::default(),
-            validation_strokes: 8,
+            validation_strokes: 12,
             validation_speeds: vec![1.0, 1.7],
         }
     }
