@@ -7,7 +7,12 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use impromptu_host_sim::plant::{Disturbance, GRAVITY, LANES, Plant, State, States, Variation, Vehicle};
+use impromptu_host_sim::{
+    condition::Condition,
+    plant::{Disturbance, GRAVITY, LANES, Plant, State, States, Variation, Vehicle},
+    rollout::{self, FlightPlan},
+    trajectory::Trajectory,
+};
 
 /// Step of the simulation, s.
 const STEP: f64 = 0.002;
@@ -39,6 +44,23 @@ fn plant(criterion: &mut Criterion) {
     group.finish();
 }
 
+/// The whole closed loop on one core: position and attitude loop of the firmware in f32, rotors, drag, Runge-Kutta in f64.
+fn closed_loop(criterion: &mut Criterion) {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
+    let vehicle = Vehicle::named("crazyflie").expect("a built-in vehicle");
+    let settings = rollout::settings(&vehicle, "stock").expect("built-in gains");
+    let condition = Condition::named("clean").expect("a built-in condition");
+    let trajectory = Trajectory::by_name("figure8", 100.0).expect("a built-in trajectory");
+    let plans: Vec<FlightPlan<'_>> = (0..8 * LANES as u64).map(|seed| FlightPlan::new(&trajectory, seed)).collect();
+    let mut group = criterion.benchmark_group("closed loop");
+    group.throughput(Throughput::Elements((plans.len() * trajectory.samples.len() * 5) as u64));
+    group.sample_size(20);
+    group.bench_function("500 Hz steps on one core", |bencher| {
+        bencher.iter(|| pool.install(|| rollout::fly(&vehicle, &settings, &condition, black_box(&plans)).expect("flights")));
+    });
+    group.finish();
+}
+
 #[cfg(feature = "peng-quad")]
 fn peng_quad(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("peng_quad");
@@ -63,7 +85,7 @@ fn peng_quad(criterion: &mut Criterion) {
 }
 
 #[cfg(feature = "peng-quad")]
-criterion_group!(benches, plant, peng_quad);
+criterion_group!(benches, plant, closed_loop, peng_quad);
 #[cfg(not(feature = "peng-quad"))]
-criterion_group!(benches, plant);
+criterion_group!(benches, plant, closed_loop);
 criterion_main!(benches);

@@ -8,6 +8,7 @@ use impromptu_firmware::{
     control::{Airframe, AttitudeGains, PositionGains},
     flight::{Flight, PREVIEW, Rates, Settings},
     model::Model,
+    replay::{Recorded, Recorder},
     types::{Setpoint, State as FirmwareState, Tick},
 };
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -50,12 +51,23 @@ pub struct FlightPlan<'a> {
     pub loop_gain: f32,
     /// Whether every reference tick is logged.
     pub log: bool,
+    /// Whether the flight stack's inputs and answers are recorded, so that another machine can fly it again (loop gain 1, no command delay).
+    pub record: bool,
 }
 
 impl<'a> FlightPlan<'a> {
     /// A flight of the nominal vehicle without add-on, dither or log.
     pub fn new(trajectory: &'a Trajectory, seed: u64) -> Self {
-        Self { trajectory, model: None, variation: Variation::default(), seed, dither: None, loop_gain: 1.0, log: false }
+        Self {
+            trajectory,
+            model: None,
+            variation: Variation::default(),
+            seed,
+            dither: None,
+            loop_gain: 1.0,
+            log: false,
+            record: false,
+        }
     }
 
     /// The same flight with an add-on.
@@ -74,6 +86,8 @@ pub struct FlightRecord {
     pub correction_rms: [f64; 3],
     /// Every reference tick, if asked for.
     pub log: Option<FlightLog>,
+    /// Everything that went into the flight stack and came out, if asked for.
+    pub recorded: Option<Recorded<Vec<u8>>>,
 }
 
 /// Why flights could not be flown.
@@ -184,6 +198,7 @@ struct Pilot<'a> {
     squares: f64,
     correction_squares: [f64; 3],
     rows: Vec<LogRow>,
+    recorder: Option<Recorder<Vec<u8>>>,
 }
 
 /// Flights that run in step.
@@ -276,8 +291,11 @@ impl<'a> Pilot<'a> {
             }
         }
         flight.set_command_delay(ticks(condition.command_delay_s) as u32);
+        let mut recorder = plan.record.then(|| Recorder::new(settings, plan.model));
         for sample in plan.trajectory.samples.iter().take(PREVIEW / 2 + PREVIEW / 4) {
-            flight.push_setpoint(&setpoint(sample));
+            let setpoint = setpoint(sample);
+            flight.push_setpoint(&setpoint);
+            recorder.iter_mut().for_each(|recorder| recorder.setpoint(&setpoint));
         }
         Ok(Self {
             flight,
@@ -288,6 +306,7 @@ impl<'a> Pilot<'a> {
             squares: 0.0,
             correction_squares: [0.0; 3],
             rows: Vec::new(),
+            recorder,
             plan,
         })
     }
@@ -307,11 +326,16 @@ impl<'a> Pilot<'a> {
             self.known.velocity = Vector3::from(velocity.map(|value| value as f32));
             let next = self.flight.next_setpoint() as usize;
             if let Some(sample) = self.plan.trajectory.samples.get(next) {
-                self.flight.push_setpoint(&setpoint(sample));
+                let setpoint = setpoint(sample);
+                self.flight.push_setpoint(&setpoint);
+                self.recorder.iter_mut().for_each(|recorder| recorder.setpoint(&setpoint));
             }
             self.dither(reference_tick);
         }
         let command = self.flight.step(Tick(tick as u32), &self.known);
+        if let Some(recorder) = &mut self.recorder {
+            recorder.tick(&self.known, &command, self.flight.reference());
+        }
         if tick.is_multiple_of(divisor) {
             self.score(reference_tick, state);
         }
@@ -324,7 +348,9 @@ impl<'a> Pilot<'a> {
         if reference_tick.is_multiple_of(hold) {
             let bits = random.random::<u64>();
             let sign = |bit: u32| if (bits >> bit) & 1 == 1 { dither.amplitude } else { -dither.amplitude };
-            self.flight.excite(Vector3::new(sign(60) as f32, sign(61) as f32, sign(62) as f32));
+            let offset = Vector3::new(sign(60) as f32, sign(61) as f32, sign(62) as f32);
+            self.flight.excite(offset);
+            self.recorder.iter_mut().for_each(|recorder| recorder.excitation(offset));
         }
     }
 
@@ -360,6 +386,7 @@ impl<'a> Pilot<'a> {
             // A flight that left the numbers is as bad as can be, not "not a number".
             rms: if rms.is_finite() { rms } else { f64::INFINITY },
             correction_rms: self.correction_squares.map(|sum| (sum / scored).sqrt()),
+            recorded: self.recorder.map(Recorder::finish),
             log: self.plan.log.then(|| FlightLog {
                 name: self.plan.trajectory.name.clone(),
                 rate_hz: self.plan.trajectory.rate_hz,
