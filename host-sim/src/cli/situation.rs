@@ -31,7 +31,7 @@ impl Situation {
 
 /// The loop of a vehicle with gains under a condition.
 pub(super) fn plant(vehicle: &str, gains: &str, condition: &str) -> Result<Loop> {
-    Ok(Loop::new(find_vehicle(vehicle)?, gains, find_condition(condition)?).context("--gains")?)
+    Loop::new(find_vehicle(vehicle)?, gains, find_condition(condition)?).context("--gains")
 }
 
 fn find_vehicle(name: &str) -> Result<Vehicle> {

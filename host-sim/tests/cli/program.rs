@@ -83,7 +83,8 @@ impl Folder {
         let run = self.run(words);
         assert_eq!(run.code, 1, "{words}: {}{}", run.stdout, run.stderr);
         assert_eq!(run.stdout, "", "{words}");
-        let message = run.stderr.lines().find(|line| line.starts_with("error: ")).unwrap_or_else(|| panic!("{words}: {}", run.stderr));
+        let message =
+            run.stderr.lines().find(|line| line.starts_with("error: ")).unwrap_or_else(|| panic!("{words}: {}", run.stderr));
         for part in named {
             assert!(message.contains(part), "{words}: `{part}` is missing in: {message}");
         }

@@ -8,7 +8,8 @@ use crate::program::Folder;
 /// Logs in `logs`, dithered ones in `dithered`.
 fn collected(condition: &str) -> Folder {
     let folder = Folder::new();
-    let run = folder.fine(&format!("collect --condition {condition} --signal strokes spline --flights 3 --seconds 12 --out logs"));
+    let run =
+        folder.fine(&format!("collect --condition {condition} --signal strokes spline --flights 3 --seconds 12 --out logs"));
     assert!(run.stdout.contains("logs/1-strokes-0001.csv") && run.stderr.contains("seed 1"), "{}{}", run.stdout, run.stderr);
     folder.fine(&format!("collect --condition {condition} --dither 0.01 --flights 2 --seconds 45 --out dithered"));
     folder
@@ -84,5 +85,8 @@ fn without_a_vehicle_or_without_dither_the_model_has_no_feedback_lane_and_says_w
     let run = folder.fine("fly --model models/model.impromptu --trajectory circle --format json");
     assert_eq!(run.json()["flights"][1]["method"], "net_int8");
     assert!(run.stderr.contains("has no feedback lane"), "{}", run.stderr);
-    folder.refused("fly --model models/model.impromptu --trajectory circle --lanes feedback", &["model.impromptu", "--lanes network"]);
+    folder.refused(
+        "fly --model models/model.impromptu --trajectory circle --lanes feedback",
+        &["model.impromptu", "--lanes network"],
+    );
 }

@@ -41,7 +41,7 @@ fn rows(learned: &Learned, description: &Description) -> Result<Vec<u8>> {
     for row in &learned.calibration {
         writer.write_record(row.iter().map(f32::to_string))?;
     }
-    Ok(writer.into_inner().context("calibration rows")?)
+    writer.into_inner().context("calibration rows")
 }
 
 /// A feature's name, such as `desired.position.x@+5`: what is read, and how many sub-rate ticks from now. What is subtracted
