@@ -73,7 +73,9 @@ impl Evaluate {
         let files = self.model.iter().map(|path| ModelFile::read(path)).collect::<Result<Vec<_>>>()?;
         for file in &files {
             // Before the first flight: a refused file should not cost minutes.
-            file.model()?;
+            if let Some(text) = file.mismatch(&file.model()?, &self.situation) {
+                session.console.note(&text);
+            }
         }
         session.console.note(&format!("seed {seed}"));
         let test_seed = session.configuration.seed_of(Purpose::Test);

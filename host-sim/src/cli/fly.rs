@@ -93,6 +93,11 @@ impl Fly {
         let file = self.model.as_deref().map(ModelFile::read).transpose()?;
         let model = file.as_ref().map(ModelFile::model).transpose()?;
         if let (Some(model), Some(file)) = (&model, &file)
+            && let Some(text) = file.mismatch(model, &self.situation)
+        {
+            session.console.note(&text);
+        }
+        if let (Some(model), Some(file)) = (&model, &file)
             && self.lanes.lanes().feedback
             && model.lane().is_none()
         {

@@ -9,6 +9,7 @@ use impromptu_firmware::{
     model::{Arithmetic, Model},
 };
 
+use super::situation::Situation;
 use crate::report::Method;
 
 /// The bytes of a model file.
@@ -31,6 +32,15 @@ impl ModelFile {
     /// The model, checked as the firmware checks it.
     pub(super) fn model(&self) -> Result<Model<'_>> {
         Model::from_bytes(&self.bytes).with_context(|| format!("{}: refused", self.name()))
+    }
+
+    /// What the model was made for, if it is flown with something else.
+    pub(super) fn mismatch(&self, model: &Model<'_>, situation: &Situation) -> Option<String> {
+        let made = &model.card().provenance;
+        let made = [made.vehicle, made.gains, made.condition];
+        let flown = [&situation.vehicle, &situation.gains, &situation.condition].map(String::as_str);
+        let differs = made != flown;
+        differs.then(|| format!("{}: made for {}, flown with {}", self.name(), made.join(" "), flown.join(" ")))
     }
 }
 

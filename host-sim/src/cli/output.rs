@@ -4,7 +4,7 @@ use std::{io::Write as _, path::Path};
 
 use anyhow::{Context as _, Result};
 use clap::ValueEnum;
-use comfy_table::{Cell, CellAlignment, Table, presets};
+use comfy_table::{Cell, CellAlignment, LineStyle, Table, presets};
 use impromptu_model_export::replacement::replace;
 use serde::Serialize;
 
@@ -49,7 +49,8 @@ pub(super) fn table<const N: usize>(header: [&str; N], left: usize, rows: impl I
         })
     };
     let mut table = Table::new();
-    table.load_style(presets::UTF8_HORIZONTAL_ONLY).set_header(cells(header.map(str::to_owned)));
+    // Lines of text are close enough to be read without rules between them.
+    table.load_style(presets::UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none())).set_header(cells(header.map(str::to_owned)));
     for row in rows {
         table.add_row(cells(row));
     }

@@ -54,6 +54,6 @@ fn a_report_is_made_again_from_stored_results() {
     assert!(String::from_utf8(folder.read("again/report.html")).unwrap().contains("Stored"));
     assert!(folder.read("again/table.csv").starts_with(b"vehicle,gains,condition"));
     assert_eq!(folder.fine("report results.json --out again --format json").json()["table"][0]["rms_cm_mean"], 9.5);
-    folder.write("broken.json", r#"{"title": 3}"#);
-    folder.refused("report broken.json --out again", &["broken.json", "title"]);
+    folder.write("broken.json", r#"{"title": "Broken"}"#);
+    folder.refused("report broken.json --out again", &["broken.json", "`command`", "line 1"]);
 }
