@@ -1,5 +1,6 @@
 //! The program `host-sim` as its users run it.
 
+mod demo;
 mod program;
 mod refusals;
 mod steps;
