@@ -65,6 +65,7 @@ struct Arguments {
 
 /// Options of every command.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Options of every command")]
 struct Global {
     /// Settings of the demo as TOML; the other commands use its `seed` and `[recipe]`. Unknown keys are refused.
     #[arg(long, global = true, value_name = "FILE.toml")]
@@ -131,10 +132,23 @@ where
         }
         Err(error) => {
             // Nothing can be done if even that cannot be written.
-            let _ = writeln!(std::io::stderr(), "error: {error:#}");
+            let _ = writeln!(std::io::stderr(), "error: {}", message(&error));
             ExitCode::from(FAILED)
         }
     }
+}
+
+/// An error with its causes on one line; a cause that the text before it already says is left out.
+fn message(error: &anyhow::Error) -> String {
+    error.chain().map(ToString::to_string).fold(String::new(), |text, cause| {
+        if text.is_empty() {
+            cause
+        } else if text.ends_with(&cause) {
+            text
+        } else {
+            format!("{text}: {cause}")
+        }
+    })
 }
 
 /// The command line that repeats the run.
@@ -162,6 +176,14 @@ fn execute(arguments: Arguments, console: &Console, command: String) -> Result<(
 mod tests {
     use super::*;
     use clap::CommandFactory as _;
+
+    #[test]
+    fn a_message_says_every_cause_once() {
+        let cause = || std::io::Error::other("disk full");
+        let error = crate::flight_log::LogError::File { file: "a.csv".into(), source: cause() };
+        assert_eq!(message(&anyhow::Error::new(error).context("--log")), "--log: a.csv: disk full");
+        assert_eq!(message(&anyhow::Error::new(cause()).context("b.csv")), "b.csv: disk full");
+    }
 
     #[test]
     fn the_arguments_are_consistent() {
