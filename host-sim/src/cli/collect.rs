@@ -1,0 +1,160 @@
+//! `host-sim collect`: flights of the baseline as CSV logs.
+
+use anyhow::{Result, bail};
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+
+use super::{Session, output::table, situation::Situation};
+use crate::{
+    experiment::{Excitation, Purpose, Recipe, Signal, demo::Observer as _},
+    flight_log::FlightLog,
+    rollout::Dither,
+};
+
+/// Flights of each kind unless told otherwise: the recipe's hundreds would be half a gigabyte of text.
+const FLIGHTS: u32 = 20;
+
+/// Arguments of `collect`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Writes a CSV file for each flight into --out, with the columns that `train --help` lists. Without --signal the recipe decides what
+is flown ([recipe] of --config). With --dither, random steps on the position reference excite the loop independently: what
+the feedback lane is identified from.
+
+Examples:
+  host-sim collect --condition lab --out logs
+  host-sim collect --condition lab --dither 0.01 --out dithered
+  host-sim collect --vehicle hummingbird --gains soft --signal multisine spline --flights 4 --seconds 90 --out logs")]
+pub(super) struct Collect {
+    #[command(flatten)]
+    situation: Situation,
+    /// Forms of the flights; the recipe's if not given.
+    #[arg(long, value_enum, value_name = "SIGNAL", num_args = 1..)]
+    signal: Vec<SignalName>,
+    /// Flights of each kind; the recipe's number if not given, but at most 20.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=9_999))]
+    flights: Option<u32>,
+    /// Length of multisine and spline flights, s; the recipe's if not given. Strokes are as long as they are.
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    seconds: Option<f64>,
+    /// Random steps on the position reference, this high, m (0.01 is usual).
+    #[arg(long, value_name = "M", value_parser = metres)]
+    dither: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum SignalName {
+    /// Twelve tones an axis.
+    Multisine,
+    /// A spline through random points.
+    Spline,
+    /// Strokes like those of the test, of other seeds.
+    Strokes,
+}
+
+impl SignalName {
+    fn signal(self) -> Signal {
+        match self {
+            Self::Multisine => Signal::Multisine,
+            Self::Spline => Signal::Spline,
+            Self::Strokes => Signal::Strokes,
+        }
+    }
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|value| (6.0..=3590.0).contains(value)).ok_or_else(|| "expected a number from 6 to 3590".into())
+}
+
+fn metres(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|value| *value > 0.0 && *value <= 1.0).ok_or_else(|| "expected a number above 0, up to 1".into())
+}
+
+/// What is printed as JSON.
+#[derive(Debug, Serialize)]
+struct Collected {
+    seed: u64,
+    logs: Vec<Log>,
+}
+
+#[derive(Debug, Serialize)]
+struct Log {
+    file: String,
+    trajectory: String,
+    seconds: f64,
+}
+
+impl Collect {
+    pub(super) fn run(self, session: &Session) -> Result<()> {
+        let plant = self.situation.plant()?;
+        let recipe = session.configuration.recipe();
+        let excitations = self.excitations(recipe);
+        if excitations.is_empty() {
+            bail!("the recipe names no training flights; give --signal");
+        }
+        let folder = session.configuration.folder()?;
+        let seed = session.configuration.seed();
+        session.console.note(&format!("seed {seed}"));
+        let dither = self.dither.map(|amplitude| Dither { amplitude, hold_s: recipe.lane.dither_hold_s });
+        let purpose = if dither.is_some() { Purpose::Identification } else { Purpose::Training };
+        let mut first = session.configuration.seed_of(purpose);
+        let mut logs = Vec::new();
+        for (index, excitation) in (1..).zip(&excitations) {
+            let flown = plant.collect(&excitation.motions(first), dither, first)?;
+            for (flight, log) in (1..).zip(&flown) {
+                let kind = name(excitation.signal);
+                let dithered = if dither.is_some() { "-dithered" } else { "" };
+                let file = folder.join(format!("{index}-{kind}{dithered}-{flight:04}.csv"));
+                log.write(&file)?;
+                logs.push(entry(log, file.display().to_string()));
+            }
+            first = first.wrapping_add(u64::from(excitation.flights));
+            session.console.steps(index, excitations.len() as u64);
+        }
+        session.console.finish();
+        let collected = Collected { seed, logs };
+        session.format.print(&collected, || text(&collected))
+    }
+
+    /// What is flown: the recipe's flights, or those asked for with the recipe's figures where it has any.
+    fn excitations(&self, recipe: &Recipe) -> Vec<Excitation> {
+        let dithered = recipe.lane.excitation;
+        let usual = if self.dither.is_some() { vec![dithered] } else { recipe.excitations.clone() };
+        let chosen: Vec<Excitation> = match self.signal.as_slice() {
+            [] => usual,
+            names => names
+                .iter()
+                .flat_map(|name| {
+                    let signal = name.signal();
+                    let found: Vec<Excitation> = usual.iter().copied().filter(|usual| usual.signal == signal).collect();
+                    if found.is_empty() { vec![Excitation { signal, ..dithered }] } else { found }
+                })
+                .collect(),
+        };
+        chosen
+            .into_iter()
+            .map(|excitation| Excitation {
+                flights: self.flights.unwrap_or(excitation.flights.min(FLIGHTS)),
+                seconds: self.seconds.unwrap_or(excitation.seconds),
+                ..excitation
+            })
+            .collect()
+    }
+}
+
+fn name(signal: Signal) -> &'static str {
+    match signal {
+        Signal::Multisine => "multisine",
+        Signal::Spline => "spline",
+        Signal::Strokes => "strokes",
+    }
+}
+
+fn entry(log: &FlightLog, file: String) -> Log {
+    Log { file, trajectory: log.name.clone(), seconds: log.rows.len() as f64 / log.rate_hz }
+}
+
+fn text(collected: &Collected) -> String {
+    let rows = collected.logs.iter().map(|log| [log.file.clone(), log.trajectory.clone(), format!("{:.1}", log.seconds)]);
+    table(["log", "trajectory", "seconds"], 2, rows)
+}

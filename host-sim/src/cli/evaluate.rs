@@ -1,0 +1,152 @@
+//! `host-sim evaluate`: models over unseen strokes, lane by lane.
+
+use std::path::PathBuf;
+
+use anyhow::{Context as _, Result};
+use clap::Args;
+use impromptu_firmware::adapter::Lanes;
+use serde::Serialize;
+
+use super::{
+    Session, fly,
+    model_file::{ModelFile, method},
+    output::{number, table},
+    situation::{Situation, milliseconds, speed},
+};
+use crate::{
+    experiment::{Loop, Purpose, demo::Observer as _},
+    report::{Method, PerFlight, Row, summarise},
+    trajectory::{Trajectory, strokes},
+};
+
+/// Arguments of `evaluate`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+A row for each model and each of: the baseline, the network alone, the feedback lane alone, both lanes. Reductions are those of
+the RMS position error against the baseline's flight of the same stroke: mean and worst over the strokes.
+
+Examples:
+  host-sim evaluate --model models/model.impromptu
+  host-sim evaluate --model a.impromptu --model b.impromptu --condition rough --speed 1,1.7 --format json
+  host-sim evaluate --model models/model.impromptu --extra-delay-ms 20 --seed 5")]
+pub(super) struct Evaluate {
+    /// Model files.
+    #[arg(long, value_name = "FILE", required = true, num_args = 1..)]
+    model: Vec<PathBuf>,
+    #[command(flatten)]
+    situation: Situation,
+    /// Factors on the speed of the strokes.
+    #[arg(long, value_name = "FACTOR", default_value = "1", value_delimiter = ',', value_parser = speed)]
+    speed: Vec<f64>,
+    /// Number of strokes.
+    #[arg(long, value_name = "N", default_value = "30", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    strokes: u32,
+    /// Further delay of the whole position loop, ms.
+    #[arg(long, value_name = "N", default_value = "0", value_parser = milliseconds)]
+    extra_delay_ms: f64,
+}
+
+/// A row of the table.
+#[derive(Debug, Serialize)]
+struct ModelRow {
+    model: String,
+    #[serde(flatten)]
+    row: Row,
+}
+
+/// What is printed as JSON.
+#[derive(Debug, Serialize)]
+struct Evaluation {
+    seed: u64,
+    strokes: u32,
+    table: Vec<ModelRow>,
+}
+
+impl Evaluate {
+    pub(super) fn run(self, session: &Session) -> Result<()> {
+        let plant = self.situation.plant()?;
+        let plant = match self.extra_delay_ms {
+            0.0 => plant,
+            delay => Loop { condition: plant.condition.delayed(delay / 1e3), ..plant },
+        };
+        let seed = session.configuration.seed();
+        let files = self.model.iter().map(|path| ModelFile::read(path)).collect::<Result<Vec<_>>>()?;
+        for file in &files {
+            // Before the first flight: a refused file should not cost minutes.
+            if let Some(text) = file.mismatch(&file.model()?, &self.situation) {
+                session.console.note(&text);
+            }
+        }
+        session.console.note(&format!("seed {seed}"));
+        let test_seed = session.configuration.seed_of(Purpose::Test);
+        let mut rows = Vec::new();
+        let of = (files.len() * self.speed.len()) as u64;
+        for &speed in &self.speed {
+            let trajectories = strokes(test_seed, self.strokes as usize, speed, plant.rate_hz())?;
+            let baseline = plant.errors(&trajectories, None, 1.0, test_seed)?;
+            for file in &files {
+                let flights = Flights { plant: &plant, trajectories: &trajectories, baseline: &baseline, speed, test_seed, seed };
+                let flights = flights.of(file).with_context(|| file.name())?;
+                rows.extend(summarise(&flights).into_iter().map(|row| ModelRow { model: file.name(), row }));
+                session.console.steps(rows.len() as u64, of);
+            }
+        }
+        session.console.finish();
+        let evaluation = Evaluation { seed, strokes: self.strokes, table: rows };
+        session.format.print(&evaluation, || text(&evaluation))
+    }
+}
+
+/// The strokes and how the baseline flew them.
+struct Flights<'a> {
+    plant: &'a Loop,
+    trajectories: &'a [Trajectory],
+    baseline: &'a [f64],
+    speed: f64,
+    test_seed: u64,
+    seed: u64,
+}
+
+impl Flights<'_> {
+    /// Every flight of the baseline and of a model: network, feedback lane, both.
+    fn of(&self, file: &ModelFile) -> Result<Vec<PerFlight>> {
+        let model = file.model()?;
+        let mut flights = self.scored(Method::Baseline, self.baseline);
+        for (network, feedback) in [(true, false), (false, true), (true, true)] {
+            if (network && model.network().is_none()) || (feedback && model.lane().is_none()) {
+                continue;
+            }
+            let lanes = Lanes { network, feedback };
+            let errors = self.plant.errors(self.trajectories, Some((&model, lanes)), 1.0, self.test_seed)?;
+            flights.extend(self.scored(method(&model, lanes), &errors));
+        }
+        Ok(flights)
+    }
+
+    fn scored(&self, method: Method, errors: &[f64]) -> Vec<PerFlight> {
+        let all = self.trajectories.iter().zip(errors).zip(self.baseline);
+        all.map(|((trajectory, &error), baseline)| PerFlight {
+            reduction: 100.0 * (1.0 - error / baseline),
+            ..fly::flight(self.plant, trajectory, self.speed, method, error, self.seed)
+        })
+        .collect()
+    }
+}
+
+fn text(evaluation: &Evaluation) -> String {
+    let rows = evaluation.table.iter().map(|ModelRow { model, row }| {
+        let reduction = |value| if row.method == Method::Baseline { String::new() } else { number(value, 1) };
+        [
+            model.clone(),
+            format!("{} {} {}", row.vehicle, row.gains, row.condition),
+            row.method.name().to_owned(),
+            format!("{}x", row.speed),
+            number(row.rms_cm_mean, 3),
+            reduction(row.reduction_mean),
+            reduction(row.reduction_worst),
+        ]
+    });
+    let header = ["model", "flown", "method", "speed", "RMS error, cm", "mean, %", "worst, %"];
+    let table = table(header, 3, rows);
+    format!("{} unseen strokes, seed {}: reduction of the RMS position error\n{table}", evaluation.strokes, evaluation.seed)
+}

@@ -1,0 +1,179 @@
+//! `host-sim fly`: one trajectory, with and without the add-on.
+
+use std::path::PathBuf;
+
+use anyhow::{Context as _, Result, bail};
+use clap::{Args, ValueEnum};
+use impromptu_firmware::adapter::Lanes;
+use serde::Serialize;
+
+use super::{
+    Session,
+    model_file::{ModelFile, method},
+    output::{number, table},
+    situation::{Situation, milliseconds, speed},
+    trajectory,
+};
+use crate::{
+    experiment::{Loop, Purpose},
+    report::{Method, PerFlight},
+    rollout::{FlightPlan, FlightRecord},
+    trajectory::Trajectory,
+};
+
+/// Arguments of `fly`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Prints the RMS position error of the baseline and of the add-on in cm, and the reduction in %. Without --model the baseline
+flies alone. The log has the columns that `train --help` lists, and the true position.
+
+Examples:
+  host-sim fly --trajectory figure8
+  host-sim fly --model models/model.impromptu --trajectory letters:HI --speed 1.7 --log hi.csv
+  host-sim fly --model models/model.impromptu --trajectory own.csv --condition rough --extra-delay-ms 20 --lanes network")]
+pub(super) struct Fly {
+    /// Model file; without it the baseline flies alone.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Name (see `trajectory --list`) or CSV file of the trajectory.
+    #[arg(long, value_name = "NAME|FILE.csv")]
+    trajectory: String,
+    #[command(flatten)]
+    situation: Situation,
+    /// Factor on the speed.
+    #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = speed)]
+    speed: f64,
+    /// Further delay of the whole position loop, ms.
+    #[arg(long, value_name = "N", default_value = "0", value_parser = milliseconds)]
+    extra_delay_ms: f64,
+    /// Lanes of the model that are on.
+    #[arg(long, value_enum, default_value_t, requires = "model")]
+    lanes: LaneChoice,
+    /// CSV file for the log of the last flight: the add-on's, or the baseline's without --model.
+    #[arg(long, value_name = "OUT.csv")]
+    log: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum LaneChoice {
+    /// Network and feedback.
+    #[default]
+    Both,
+    /// The network alone: the add-on of the paper.
+    Network,
+    /// The feedback lane alone.
+    Feedback,
+    /// None: the baseline, to the bit.
+    None,
+}
+
+impl LaneChoice {
+    fn lanes(self) -> Lanes {
+        Lanes { network: matches!(self, Self::Both | Self::Network), feedback: matches!(self, Self::Both | Self::Feedback) }
+    }
+}
+
+/// What is printed as JSON.
+#[derive(Debug, Serialize)]
+struct Flown {
+    model: Option<String>,
+    extra_delay_ms: f64,
+    flights: Vec<PerFlight>,
+    log: Option<PathBuf>,
+}
+
+impl Fly {
+    pub(super) fn run(self, session: &Session) -> Result<()> {
+        let plant = self.situation.plant()?;
+        let plant = match self.extra_delay_ms {
+            0.0 => plant,
+            delay => Loop { condition: plant.condition.delayed(delay / 1e3), ..plant },
+        };
+        let trajectory = trajectory::find(&self.trajectory)?.scaled(self.speed).sampled(plant.rate_hz())?;
+        let file = self.model.as_deref().map(ModelFile::read).transpose()?;
+        let model = file.as_ref().map(ModelFile::model).transpose()?;
+        if let (Some(model), Some(file)) = (&model, &file)
+            && let Some(text) = file.mismatch(model, &self.situation)
+        {
+            session.console.note(&text);
+        }
+        if let (Some(model), Some(file)) = (&model, &file)
+            && self.lanes.lanes().feedback
+            && model.lane().is_none()
+        {
+            if self.lanes == LaneChoice::Feedback {
+                bail!("{}: has no feedback lane; give --lanes network", file.name());
+            }
+            session.console.note(&format!("{}: has no feedback lane, its network flies alone", file.name()));
+        }
+        let seed = session.configuration.seed();
+        let flight_seed = session.configuration.seed_of(Purpose::Test);
+        session.console.note(&format!("seed {seed}"));
+        let baseline = FlightPlan { log: model.is_none(), ..FlightPlan::new(&trajectory, flight_seed) };
+        let mut methods = vec![Method::Baseline];
+        let mut plans = vec![baseline];
+        if let Some(model) = &model {
+            let lanes = self.lanes.lanes();
+            plans.push(FlightPlan { log: true, ..FlightPlan::new(&trajectory, flight_seed).with(model, lanes) });
+            methods.push(method(model, lanes));
+        }
+        let records =
+            plant.fly(&plans).with_context(|| file.as_ref().map_or_else(|| self.trajectory.clone(), ModelFile::name))?;
+        if let Some(path) = &self.log {
+            write_log(&records, path)?;
+            session.console.note(&format!("log: {}", path.display()));
+        }
+        let baseline = records[0].rms;
+        let flights = records.iter().zip(methods).map(|(record, method)| PerFlight {
+            reduction: 100.0 * (1.0 - record.rms / baseline),
+            ..flight(&plant, &trajectory, self.speed, method, record.rms, seed)
+        });
+        let flown = Flown {
+            model: file.as_ref().map(ModelFile::name),
+            extra_delay_ms: self.extra_delay_ms,
+            flights: flights.collect(),
+            log: self.log,
+        };
+        session.format.print(&flown, || text(&flown))
+    }
+}
+
+/// A flight as it is reported; the reduction is 0.
+pub(super) fn flight(plant: &Loop, trajectory: &Trajectory, speed: f64, method: Method, rms: f64, seed: u64) -> PerFlight {
+    PerFlight {
+        vehicle: plant.vehicle.name.clone(),
+        gains: plant.gains.clone(),
+        condition: plant.condition.name.clone(),
+        speed,
+        method,
+        trajectory: trajectory.name.clone(),
+        rms_cm: 100.0 * rms,
+        reduction: 0.0,
+        seed,
+    }
+}
+
+fn write_log(records: &[FlightRecord], path: &std::path::Path) -> Result<()> {
+    let Some(log) = records.last().and_then(|record| record.log.as_ref()) else { return Ok(()) };
+    let finite = |row: &crate::flight_log::LogRow| {
+        row.measured_position.iter().chain(&row.true_position.unwrap_or_default()).all(|x| x.is_finite())
+    };
+    if !log.rows.iter().all(finite) {
+        bail!("{}: not written, the flight left the numbers; fly slower or with other gains", path.display());
+    }
+    Ok(log.write(path)?)
+}
+
+fn text(flown: &Flown) -> String {
+    let rows = flown.flights.iter().map(|flight| {
+        [
+            flight.method.name().to_owned(),
+            number(flight.rms_cm, 3),
+            if flight.method == Method::Baseline { String::new() } else { number(flight.reduction, 1) },
+        ]
+    });
+    let head = flown.flights.first().map_or_else(String::new, |flight| {
+        format!("{} at {}x speed: {} {} {}\n", flight.trajectory, flight.speed, flight.vehicle, flight.gains, flight.condition)
+    });
+    head + &table(["method", "RMS error, cm", "reduction, %"], 1, rows)
+}

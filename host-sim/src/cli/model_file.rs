@@ -1,0 +1,68 @@
+//! Model files that are flown.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result};
+use impromptu_firmware::{
+    adapter::Lanes,
+    features::{Relative, Source},
+    model::{Arithmetic, Model},
+};
+
+use super::situation::Situation;
+use crate::report::Method;
+
+/// The bytes of a model file.
+pub(super) struct ModelFile {
+    path: PathBuf,
+    bytes: Vec<u8>,
+}
+
+impl ModelFile {
+    pub(super) fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).with_context(|| path.display().to_string())?;
+        Ok(Self { path: path.to_owned(), bytes })
+    }
+
+    /// The file as it was named.
+    pub(super) fn name(&self) -> String {
+        self.path.display().to_string()
+    }
+
+    /// The model, checked as the firmware checks it.
+    pub(super) fn model(&self) -> Result<Model<'_>> {
+        Model::from_bytes(&self.bytes).with_context(|| format!("{}: refused", self.name()))
+    }
+
+    /// What the model was made for, if it is flown with something else.
+    pub(super) fn mismatch(&self, model: &Model<'_>, situation: &Situation) -> Option<String> {
+        let made = &model.card().provenance;
+        let made = [made.vehicle, made.gains, made.condition];
+        let flown = [&situation.vehicle, &situation.gains, &situation.condition].map(String::as_str);
+        let differs = made != flown;
+        differs.then(|| format!("{}: made for {}, flown with {}", self.name(), made.join(" "), flown.join(" ")))
+    }
+}
+
+/// The method as which flights with these lanes are reported.
+pub(super) fn method(model: &Model<'_>, lanes: Lanes) -> Method {
+    let card = model.card();
+    // Accelerations alone, as they are desired now: the flatness feed-forward.
+    let accelerations = card.features.iter().all(|feature| {
+        let present = feature.offset == 0 && feature.relative == Relative::Nothing;
+        present && feature.source == Source::Desired && (6..9).contains(&feature.channel)
+    });
+    let [alone, with_feedback] = match &card.network {
+        Some(network) if network.layers.is_empty() && accelerations => [Method::Feedforward, Method::FeedforwardFeedback],
+        Some(network) if network.layers.is_empty() => [Method::Ridge, Method::FullRidge],
+        Some(network) if network.arithmetic == Arithmetic::Float => [Method::NetF32, Method::FullF32],
+        Some(_) => [Method::NetInt8, Method::FullInt8],
+        None => [Method::Baseline, Method::Feedback],
+    };
+    match (lanes.network, lanes.feedback && model.lane().is_some()) {
+        (true, true) => with_feedback,
+        (true, false) => alone,
+        (false, true) => Method::Feedback,
+        (false, false) => Method::Baseline,
+    }
+}

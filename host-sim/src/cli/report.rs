@@ -1,0 +1,31 @@
+//! `host-sim report`: stored results to the page, the tables and the console.
+
+use std::path::PathBuf;
+
+use anyhow::{Context as _, Result};
+use clap::Args;
+
+use super::{Session, demo};
+use crate::report::Results;
+
+/// Arguments of `report`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Writes report.html, table.csv and flights.csv into --out, and prints the table.
+
+Example:
+  host-sim report out/results.json --out again")]
+pub(super) struct Report {
+    /// Results of the demo: results.json, or what --format json printed.
+    #[arg(value_name = "RESULTS.json")]
+    results: PathBuf,
+}
+
+impl Report {
+    pub(super) fn run(self, session: &Session) -> Result<()> {
+        let name = self.results.display();
+        let text = std::fs::read_to_string(&self.results).with_context(|| name.to_string())?;
+        let results = Results::from_json(&text).with_context(|| name.to_string())?;
+        demo::show(session, &results, &session.configuration.folder()?)
+    }
+}

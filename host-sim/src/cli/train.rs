@@ -1,0 +1,223 @@
+//! `host-sim train`: flight logs to a model.
+
+mod columns;
+mod feedback;
+mod files;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result, bail};
+use clap::Args;
+use impromptu_firmware::flight::Rates;
+use impromptu_model_export::{
+    Description, Precision,
+    description::{LaneDescription, Provenance, Timing},
+    encode,
+};
+use serde::Serialize;
+
+use super::{
+    Session,
+    configuration::toml,
+    output::table,
+    situation::{milliseconds, plant},
+};
+use crate::{
+    experiment::{Learned, Loop, Recipe, demo::Observer as _, describe, learn, smoothing},
+    flight_log::FlightLog,
+    training::Progress,
+};
+
+/// Arguments of `train`.
+#[derive(Debug, Args)]
+#[command(after_help = columns::HELP)]
+pub(super) struct Train {
+    /// Flight logs of the baseline; two at least, every fourth one decides when to stop.
+    #[arg(long, value_name = "FILE.csv", required = true, num_args = 1..)]
+    log: Vec<PathBuf>,
+    /// Logs with an independent dither on the position reference, for the feedback lane; those of --log if not given.
+    #[arg(long, value_name = "FILE.csv", num_args = 1..)]
+    dithered: Vec<PathBuf>,
+    /// Age of the logged measurements, ms; the condition's if there is a vehicle [default: 24].
+    #[arg(long, value_name = "N", value_parser = milliseconds)]
+    delay_ms: Option<f64>,
+    /// Zero-phase smoothing of the logs, ms; 0 for logs without noise [default: the recipe's, 60].
+    #[arg(long, value_name = "N", value_parser = milliseconds)]
+    smoothing_ms: Option<f64>,
+    /// Vehicle (name or TOML file) for the validation flights on which the feedback lane is chosen; none without it.
+    #[arg(long, value_name = "NAME|FILE.toml")]
+    vehicle: Option<String>,
+    /// Gains of its position loop.
+    #[arg(long, value_name = "NAME", default_value = "stock", requires = "vehicle")]
+    gains: String,
+    /// Condition of the validation flights.
+    #[arg(long, value_name = "NAME|FILE.toml", default_value = "lab", requires = "vehicle")]
+    condition: String,
+    /// Name of the model and of its files.
+    #[arg(long, default_value = "model", value_parser = file_name)]
+    name: String,
+    /// Recipe as TOML, in the place of the configuration's `[recipe]`.
+    #[arg(long, value_name = "FILE.toml")]
+    recipe: Option<PathBuf>,
+}
+
+fn file_name(text: &str) -> Result<String, String> {
+    let plain = Path::new(text).file_name().is_some_and(|name| name == text) && text.len() <= 64;
+    if plain { Ok(text.to_owned()) } else { Err("expected a file name without folders, at most 64 bytes long".into()) }
+}
+
+/// What is printed as JSON.
+#[derive(Debug, Serialize)]
+struct Trained {
+    name: String,
+    seed: u64,
+    logs: usize,
+    rows: usize,
+    bytes: usize,
+    /// Design of the feedback lane, or `null`.
+    feedback_lane: Option<String>,
+    /// Why there is no feedback lane, or `null`.
+    refusal: Option<String>,
+    files: Vec<PathBuf>,
+}
+
+/// The logs' loop: what of it is known.
+struct Origin {
+    /// The simulated loop of the validation flights.
+    plant: Option<Loop>,
+    /// The loop whose signals and rates the model has.
+    template: Loop,
+    delay_s: f64,
+    smoothing_s: f64,
+}
+
+impl Train {
+    pub(super) fn run(self, session: &Session) -> Result<()> {
+        let seed = session.configuration.seed();
+        let mut recipe: Recipe = match &self.recipe {
+            Some(path) => toml(path).context("--recipe")?,
+            None => session.configuration.recipe().clone(),
+        };
+        (recipe.network.seed, recipe.fine_tuning.seed) = (seed, seed);
+        let origin = self.origin(&recipe)?;
+        let rate_hz = f64::from(Rates::default().reference_hz());
+        let read = |paths: &[PathBuf]| paths.iter().map(|path| FlightLog::read(path, rate_hz)).collect::<Result<Vec<_>, _>>();
+        let (logs, dithered) = (read(&self.log)?, read(&self.dithered)?);
+        check_movement(&logs)?;
+        let folder = session.configuration.folder()?;
+        session.console.note(&format!("seed {seed}"));
+
+        session.console.stage(&format!("training on {} logs", logs.len()));
+        let learned = learn(&recipe, &logs, origin.delay_s, origin.smoothing_s, &mut watched(session, &recipe))?;
+        session.console.finish();
+        let describe = |lane: Option<&LaneDescription>, remarks: &str| {
+            describe_model(&self.name, &recipe, &origin, &learned, lane, remarks, seed)
+        };
+        session.console.stage("designing the feedback lane");
+        let identification = if dithered.is_empty() { &logs } else { &dithered };
+        let lane = feedback::choose(session, &recipe, origin.plant.as_ref(), identification, &|lane| {
+            encode(&describe(Some(lane), ""), Some(&learned.quantised), Precision::Int8, &learned.calibration)
+        });
+        let (remarks, design, refusal) = match &lane {
+            Ok(choice) => (format!("feedback lane: {}", choice.design), Some(choice.design.clone()), None),
+            Err(reason) => (format!("no feedback lane: {reason}"), None, Some(reason.clone())),
+        };
+        session.console.note(&remarks);
+        let description = describe(lane.as_ref().ok().map(|choice| &choice.lane), &remarks);
+        let model = encode(&description, Some(&learned.quantised), Precision::Int8, &learned.calibration)?;
+        let files = files::write(&folder, &self.name, &learned, &description, &model)?;
+        let trained = Trained {
+            name: self.name,
+            seed,
+            logs: logs.len(),
+            rows: learned.rows,
+            bytes: model.len(),
+            feedback_lane: design,
+            refusal,
+            files,
+        };
+        session.format.print(&trained, || text(&trained))
+    }
+
+    fn origin(&self, recipe: &Recipe) -> Result<Origin> {
+        let known = self.vehicle.as_ref().map(|vehicle| plant(vehicle, &self.gains, &self.condition)).transpose()?;
+        let delay_s = match (self.delay_ms, &known) {
+            (Some(delay), _) => delay / 1e3,
+            (None, Some(plant)) => plant.condition.measurement_delay_s,
+            (None, None) => 0.024,
+        };
+        let smoothing_s = match (self.smoothing_ms, &known) {
+            (Some(smoothing), _) => smoothing / 1e3,
+            (None, Some(plant)) => smoothing(recipe, plant),
+            (None, None) => recipe.smoothing_s,
+        };
+        let template = match &known {
+            Some(plant) => plant.clone(),
+            None => plant("crazyflie", "stock", "lab")?,
+        };
+        Ok(Origin { plant: known, template, delay_s, smoothing_s })
+    }
+}
+
+/// Logs in which nothing moves teach nothing: the largest extent of the measured path, m, must be above this.
+const LEAST_EXTENT: f64 = 0.2;
+
+fn check_movement(logs: &[FlightLog]) -> Result<()> {
+    let extent = (0..3).map(|axis| {
+        let values = || logs.iter().flat_map(|log| log.rows.iter().map(move |row| row.measured_position[axis]));
+        values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+    });
+    let extent = extent.fold(0.0, f64::max);
+    if extent < LEAST_EXTENT {
+        bail!(
+            "--log: no excitation: the vehicle moves by {extent:.3} m only; log flights along strokes, splines or several tones"
+        );
+    }
+    Ok(())
+}
+
+/// Passes epochs on; the two trainings are one count.
+fn watched<'a>(session: &'a Session, recipe: &Recipe) -> impl FnMut(Progress) + use<'a> {
+    let of = (recipe.network.epochs + recipe.fine_tuning.epochs) as u64;
+    let mut done = 0;
+    move |progress: Progress| {
+        done += u64::from(progress.epoch > 0);
+        session.console.steps(done, of);
+    }
+}
+
+/// The description, with what is known of the logs' origin.
+fn describe_model(
+    name: &str,
+    recipe: &Recipe,
+    origin: &Origin,
+    learned: &Learned,
+    lane: Option<&LaneDescription>,
+    remarks: &str,
+    seed: u64,
+) -> Description {
+    let description = describe(recipe, &origin.template, learned, lane, name, remarks, seed);
+    let provenance = match &origin.plant {
+        Some(_) => description.provenance,
+        None => {
+            let unknown = || "not stated".to_owned();
+            Provenance { vehicle: unknown(), gains: unknown(), condition: unknown(), ..description.provenance }
+        }
+    };
+    let timing = Timing { measurement_delay_s: origin.delay_s as f32, ..description.timing };
+    Description { name: name.into(), provenance, timing, ..description }
+}
+
+fn text(trained: &Trained) -> String {
+    let lane = match (&trained.feedback_lane, &trained.refusal) {
+        (Some(design), _) => design.clone(),
+        (None, reason) => format!("none: {}", reason.as_deref().unwrap_or_default()),
+    };
+    let mut rows = vec![
+        ["model".to_owned(), format!("{}, {} bytes, seed {}", trained.name, trained.bytes, trained.seed)],
+        ["trained on".to_owned(), format!("{} rows of {} logs", trained.rows, trained.logs)],
+        ["feedback lane".to_owned(), lane],
+    ];
+    rows.extend(trained.files.iter().map(|file| ["file".to_owned(), file.display().to_string()]));
+    table(["", "result"], 2, rows)
+}

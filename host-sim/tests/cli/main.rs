@@ -1,0 +1,7 @@
+//! The program `host-sim` as its users run it.
+
+mod demo;
+mod program;
+mod refusals;
+mod steps;
+mod tables;
