@@ -2,7 +2,6 @@
 
 mod columns;
 mod feedback;
-mod files;
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +9,7 @@ use anyhow::{Context as _, Result, bail};
 use clap::Args;
 use impromptu_firmware::flight::Rates;
 use impromptu_model_export::{
-    Description, Precision,
+    Description, FloatNetwork, Precision,
     description::{LaneDescription, Provenance, Timing},
     encode,
 };
@@ -23,7 +22,10 @@ use super::{
     situation::{milliseconds, plant},
 };
 use crate::{
-    experiment::{Learned, Loop, Recipe, demo::Observer as _, describe, learn, smoothing},
+    experiment::{
+        Judge, Learned, Loop, Purpose, Recipe, Rows, best_in_flight, demo::Observer as _, derived, describe, learn, smoothing,
+        validation_strokes, write_model_files,
+    },
     flight_log::FlightLog,
     training::Progress,
 };
@@ -108,7 +110,20 @@ impl Train {
         session.console.note(&format!("seed {seed}"));
 
         session.console.stage(&format!("training on {} logs", logs.len()));
-        let learned = learn(&recipe, &logs, origin.delay_s, origin.smoothing_s, &mut watched(session, &recipe))?;
+        let validation = match &origin.plant {
+            Some(plant) => validation_strokes(&recipe, &recipe.validation_speeds, plant.rate_hz(), seed)?,
+            None => Vec::new(),
+        };
+        let in_flight = |ridge: &FloatNetwork, candidates: &[FloatNetwork], rows: &Rows| {
+            let flight_seed = derived(seed, Purpose::Validation);
+            let flown = origin
+                .plant
+                .as_ref()
+                .map(|plant| best_in_flight(&recipe, plant, &validation, flight_seed, ridge, candidates, rows));
+            flown.and_then(Result::ok).unwrap_or(0)
+        };
+        let judge: Option<&Judge<'_>> = if origin.plant.is_some() { Some(&in_flight) } else { None };
+        let learned = learn(&recipe, &logs, origin.delay_s, origin.smoothing_s, judge, &mut watched(session, &recipe))?;
         session.console.finish();
         let describe = |lane: Option<&LaneDescription>, remarks: &str| {
             describe_model(&self.name, &recipe, &origin, &learned, lane, remarks, seed)
@@ -116,7 +131,7 @@ impl Train {
         session.console.stage("designing the feedback lane");
         let identification = if dithered.is_empty() { &logs } else { &dithered };
         let lane = feedback::choose(session, &recipe, origin.plant.as_ref(), identification, &|lane| {
-            encode(&describe(Some(lane), ""), Some(&learned.quantised), Precision::Int8, &learned.calibration)
+            encode(&describe(Some(lane), ""), Some(&learned.quantised), Precision::Int8, &learned.rows.calibration)
         });
         let (remarks, design, refusal) = match &lane {
             Ok(choice) => (format!("feedback lane: {}", choice.design), Some(choice.design.clone()), None),
@@ -124,13 +139,13 @@ impl Train {
         };
         session.console.note(&remarks);
         let description = describe(lane.as_ref().ok().map(|choice| &choice.lane), &remarks);
-        let model = encode(&description, Some(&learned.quantised), Precision::Int8, &learned.calibration)?;
-        let files = files::write(&folder, &self.name, &learned, &description, &model)?;
+        let model = encode(&description, Some(&learned.quantised), Precision::Int8, &learned.rows.calibration)?;
+        let files = write_model_files(&folder, &self.name, &learned, &description, &model)?;
         let trained = Trained {
             name: self.name,
             seed,
             logs: logs.len(),
-            rows: learned.rows,
+            rows: learned.rows.count,
             bytes: model.len(),
             feedback_lane: design,
             refusal,
@@ -178,7 +193,7 @@ fn check_movement(logs: &[FlightLog]) -> Result<()> {
 
 /// Passes epochs on; the two trainings are one count.
 fn watched<'a>(session: &'a Session, recipe: &Recipe) -> impl FnMut(Progress) + use<'a> {
-    let of = (recipe.network.epochs + recipe.fine_tuning.epochs) as u64;
+    let of = (recipe.network.epochs * recipe.weight_decays.len() + recipe.fine_tuning.epochs) as u64;
     let mut done = 0;
     move |progress: Progress| {
         done += u64::from(progress.epoch > 0);
@@ -196,7 +211,7 @@ fn describe_model(
     remarks: &str,
     seed: u64,
 ) -> Description {
-    let description = describe(recipe, &origin.template, learned, lane, name, remarks, seed);
+    let description = describe(recipe, &origin.template, &learned.rows, lane, name, remarks, seed);
     let provenance = match &origin.plant {
         Some(_) => description.provenance,
         None => {

@@ -111,7 +111,7 @@ pub fn build(recipe: &Recipe, plant: &Loop, seed: u64, progress: &mut dyn FnMut(
     let judge = |ridge: &FloatNetwork, candidates: &[FloatNetwork], rows: &Rows| {
         best_in_flight(&recipe, plant, &validation, flight_seed, ridge, candidates, rows).unwrap_or(0)
     };
-    let learned = learn(&recipe, &logs, delay, smoothing(&recipe, plant), &judge, progress)?;
+    let learned = learn(&recipe, &logs, delay, smoothing(&recipe, plant), Some(&judge), progress)?;
     drop(logs);
 
     let dithered = dithered_logs(&recipe.lane, plant, derived(seed, Purpose::Identification))?;
@@ -150,7 +150,10 @@ const LOSS_AGAINST_RIDGE: f64 = 0.1;
 
 /// The candidate with the best mean reduction over the validation flights, nominal and late, each speed by itself; first come those
 /// that are nowhere worse than the ridge regression on the same features.
-fn best_in_flight(
+///
+/// # Errors
+/// If a candidate cannot be encoded or flown.
+pub fn best_in_flight(
     recipe: &Recipe,
     plant: &Loop,
     validation: &[Trajectory],

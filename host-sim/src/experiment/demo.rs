@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     build::{Built, Purpose, build, derived},
     evaluation::{evaluate, model_card, traces},
+    files::write_model_files,
     flights::Loop,
     models::describe,
     recipe::Recipe,
@@ -151,11 +152,11 @@ pub fn run(settings: &DemoSettings, observer: &dyn Observer) -> anyhow::Result<R
         for (trace, log) in outcome.traces {
             if let Some(out) = &settings.out {
                 let name = format!(
-                    "{}-{}-{}-{}-{}.csv",
+                    "{}-{}-{}-stroke{}-{}.csv",
                     trace.vehicle,
                     trace.gains,
                     trace.condition,
-                    trace.trajectory.replace(':', "-"),
+                    trace.trajectory.rsplit(':').next().unwrap_or("0"),
                     trace.method.name()
                 );
                 log.write(&folder(out, "logs")?.join(name))?;
@@ -219,13 +220,7 @@ fn folder(out: &Path, name: &str) -> anyhow::Result<PathBuf> {
 fn write_models(out: &Path, settings: &DemoSettings, plant: &Loop, built: &Built, seed: u64) -> anyhow::Result<()> {
     let lane = built.lane.as_ref().ok().map(|choice| &choice.lane);
     let description = describe(&settings.recipe, plant, &built.learned.rows, lane, "net", "", seed);
-    let stem = folder(out, "models")?.join(format!("{}-{}-{}-seed{seed}", plant.vehicle.name, plant.gains, plant.condition.name));
-    let write = |extension: &str, bytes: &[u8]| {
-        let path = PathBuf::from(format!("{}.{extension}", stem.display()));
-        impromptu_model_export::replacement::replace(&path, bytes).with_context(|| format!("cannot write {}", path.display()))
-    };
-    write("impromptu", &built.models.int8)?;
-    write("safetensors", &built.learned.quantised.to_bytes()?)?;
-    write("json", description.to_json().as_bytes())?;
+    let name = format!("{}-{}-{}-seed{seed}", plant.vehicle.name, plant.gains, plant.condition.name);
+    write_model_files(&folder(out, "models")?, &name, &built.learned, &description, &built.models.int8)?;
     Ok(())
 }

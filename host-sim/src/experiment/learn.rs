@@ -65,7 +65,7 @@ pub struct Rows {
 }
 
 /// Learns from logs of the baseline; every fourth log is kept to decide when a training has been long enough. `judge` chooses between
-/// the recipe's candidates, which should be done in flight.
+/// the recipe's candidates, which should be done in flight; without it the kept logs decide by rows.
 ///
 /// # Errors
 /// If the logs hold too little or the training fails.
@@ -74,7 +74,7 @@ pub fn learn(
     logs: &[FlightLog],
     measurement_delay_s: f64,
     smoothing_s: f64,
-    judge: &Judge<'_>,
+    judge: Option<&Judge<'_>>,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Learned, LearnError> {
     if logs.len() < 2 {
@@ -102,10 +102,24 @@ pub fn learn(
         let network = train(&settings, &training, &validation, progress)?.network;
         candidates.extend(recipe.shares.iter().map(|&share| shared(&network, share)));
     }
-    let chosen = judge(&ridge, &candidates, &rows).min(candidates.len().saturating_sub(1));
+    let chosen = judge.map_or_else(|| best_on_rows(&candidates, &validation), |judge| judge(&ridge, &candidates, &rows));
     let network = candidates.into_iter().nth(chosen).ok_or(LearnError::NoCandidate)?;
     let quantised = fine_tune(&network, &recipe.fine_tuning, &training, &validation, progress)?.network;
     Ok(Learned { ridge, network, quantised, rows })
+}
+
+/// The candidate with the least squared error on rows that it has not seen, each output by its own scale.
+fn best_on_rows(candidates: &[FloatNetwork], data: &Dataset) -> usize {
+    let loss = |network: &FloatNetwork| -> f64 {
+        let rows = data.inputs().iter().zip(data.labels().iter());
+        rows.map(|(input, label)| {
+            let errors = network.evaluate(input).into_iter().zip(label).zip(&network.output_scale);
+            errors.map(|((found, label), scale)| f64::from((found - label) / scale).powi(2)).sum::<f64>()
+        })
+        .sum()
+    };
+    let losses = candidates.iter().map(loss).enumerate();
+    losses.min_by(|(_, a), (_, b)| a.total_cmp(b)).map_or(0, |(index, _)| index)
 }
 
 /// The network with `share` of what its layers add to the skip.

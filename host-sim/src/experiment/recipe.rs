@@ -190,8 +190,8 @@ impl Default for Recipe {
             weight_decays: vec![0.03, 0.2],
             shares: vec![1.0, 0.85, 0.7],
             fine_tuning: TrainingSettings {
-                epochs: 10,
-                learning_rate: 2e-4,
+                epochs: 4,
+                learning_rate: 5e-5,
                 quantisation: Some(FakeQuantisation::default()),
                 ..TrainingSettings::default()
             },

@@ -9,11 +9,13 @@ use impromptu_model_export::{
     description::{ChannelDescription, Signals},
 };
 
-use super::super::output;
-use crate::experiment::Learned;
+use super::learn::Learned;
 
-/// Writes network, description, calibration rows and model. All bytes are made before the first file is replaced.
-pub(super) fn write(
+/// Writes network, description, calibration rows and model, each replaced whole and only when all bytes are made.
+///
+/// # Errors
+/// Names the file that cannot be written.
+pub fn write_model_files(
     folder: &Path,
     name: &str,
     learned: &Learned,
@@ -28,7 +30,8 @@ pub(super) fn write(
     let mut written = Vec::new();
     for (extension, bytes) in contents {
         let path = folder.join(format!("{name}.{extension}"));
-        output::write(&path, bytes)?;
+        impromptu_model_export::replacement::replace(&path, bytes)
+            .with_context(|| format!("{}: cannot be written", path.display()))?;
         written.push(path);
     }
     Ok(written)
@@ -38,7 +41,7 @@ pub(super) fn write(
 fn rows(learned: &Learned, description: &Description) -> Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(description.features.iter().map(|feature| column(feature, &description.signals)))?;
-    for row in &learned.calibration {
+    for row in &learned.rows.calibration {
         writer.write_record(row.iter().map(f32::to_string))?;
     }
     writer.into_inner().context("calibration rows")
