@@ -73,6 +73,7 @@ pub(crate) fn lane(errors: [Vec<f32>; 2], outputs: Vec<f32>, integral: f32) -> L
             fast_limit: 0.05,
             integral_limit: 0.1,
         }],
+        authority: Default::default(),
         margins: Margins { delay_ms: 30.0, gain: 2.0, modulus: 0.5 },
     }
 }

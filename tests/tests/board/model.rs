@@ -59,6 +59,7 @@ pub(crate) fn file(shape: &Shape, precision: Precision) -> Vec<u8> {
         outputs: (0..6).map(output).collect(),
         lane: Some(LaneDescription {
             axes: (0..3).map(|axis| lane_axis(axis, &mut random)).collect(),
+            authority: Default::default(),
             margins: Margins::default(),
         }),
     };

@@ -1,0 +1,164 @@
+//! The main job, as a newcomer runs it, and what it must show: 30 strokes that nobody trained on, three conditions, two vehicles.
+
+use std::{
+    path::PathBuf,
+    sync::{LazyLock, Mutex},
+};
+
+use impromptu_firmware::{adapter::Lanes, model::Model};
+use impromptu_host_sim::{
+    condition::Condition,
+    experiment::{
+        Loop,
+        demo::{DemoSettings, Observer, run},
+    },
+    plant::Vehicle,
+    report::{Method, Results, Row},
+    rollout::FlightPlan,
+    trajectory::strokes,
+};
+use impromptu_tests::{board, golden};
+
+struct Silent;
+
+impl Observer for Silent {
+    fn stage(&self, _: &str) {}
+    fn steps(&self, _: u64, _: u64) {}
+}
+
+/// Folder of the models and logs that the demo writes.
+fn folder() -> PathBuf {
+    PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("demo")
+}
+
+/// The demo of `cargo run --release`, flown once for all tests.
+static RESULTS: LazyLock<Results> =
+    LazyLock::new(|| run(&DemoSettings { out: Some(folder()), ..DemoSettings::default() }, &Silent).expect("the demo runs"));
+
+fn row(vehicle: &str, condition: &str, speed: f64, method: Method) -> &'static Row {
+    let found = RESULTS
+        .table
+        .iter()
+        .find(|row| row.vehicle == vehicle && row.condition == condition && row.speed == speed && row.method == method);
+    found.unwrap_or_else(|| panic!("{vehicle} {condition} {speed} {method:?} is in the table"))
+}
+
+const VEHICLES: [&str; 2] = ["crazyflie", "crazyflie-brushless"];
+
+fn at_least(row: &Row, mean: f64, worst: f64) {
+    assert!(row.reduction_mean >= mean && row.reduction_worst >= worst, "asked {mean} / {worst}: {row:?}");
+}
+
+#[test]
+fn both_lanes_track_unseen_strokes_better() {
+    for (condition, mean, worst) in [("clean", 98.5, 95.0), ("lab", 96.0, 91.0), ("rough", 92.5, 85.0)] {
+        for vehicle in VEHICLES {
+            at_least(row(vehicle, condition, 1.0, Method::FullInt8), mean, worst);
+        }
+    }
+}
+
+#[test]
+fn twenty_milliseconds_more_delay_do_no_harm() {
+    for (condition, mean) in [("lab+20ms", 92.0), ("rough+20ms", 87.0)] {
+        for vehicle in VEHICLES {
+            at_least(row(vehicle, condition, 1.0, Method::FullInt8), mean, 0.0);
+        }
+    }
+}
+
+#[test]
+fn the_network_lane_alone_is_what_the_paper_promises_and_more() {
+    for (condition, mean) in [("clean", 98.0), ("lab", 89.0), ("rough", 76.0)] {
+        for vehicle in VEHICLES {
+            at_least(row(vehicle, condition, 1.0, Method::NetInt8), mean, 0.0);
+        }
+    }
+}
+
+#[test]
+fn the_network_earns_its_place_against_ridge_regression() {
+    let over = |vehicle, condition: &str, speed| {
+        let mean = |method| row(vehicle, condition, speed, method).reduction_mean;
+        mean(Method::NetF32) - mean(Method::Ridge)
+    };
+    for vehicle in VEHICLES {
+        for condition in Condition::NAMES {
+            for speed in [1.0, 1.35, 1.7] {
+                let points = over(vehicle, condition, speed);
+                assert!(points >= -0.3, "{vehicle} {condition} {speed}: {points}");
+            }
+        }
+    }
+    assert!(over("crazyflie-brushless", "clean", 1.35) >= 2.5);
+    assert!(over("crazyflie-brushless", "clean", 1.7) >= 4.0);
+    assert!(over("crazyflie", "clean", 1.7) >= 1.5);
+}
+
+#[test]
+fn fast_flights_keep_the_gain_of_both_lanes() {
+    at_least(row("crazyflie", "lab", 1.7, Method::FullInt8), 95.5, 84.0);
+}
+
+#[test]
+fn both_lanes_beat_flatness_with_the_same_kind_of_feedback() {
+    for full in RESULTS.table.iter().filter(|row| row.method == Method::FullInt8) {
+        let flatness = row(&full.vehicle, &full.condition, full.speed, Method::FeedforwardFeedback);
+        // Five points, or four fifths of the error that is left where five points would be more than 100 %.
+        let ahead = full.reduction_mean - flatness.reduction_mean;
+        let share = (100.0 - full.reduction_mean) / (100.0 - flatness.reduction_mean);
+        assert!(ahead >= 5.0 || share <= 0.2, "{full:?} against {flatness:?}");
+    }
+}
+
+#[test]
+fn quantisation_costs_at_most_half_a_point() {
+    for int8 in &RESULTS.table {
+        let float = match int8.method {
+            Method::NetInt8 => Method::NetF32,
+            Method::FullInt8 => Method::FullF32,
+            _ => continue,
+        };
+        let float = row(&int8.vehicle, &int8.condition, int8.speed, float);
+        assert!(int8.reduction_mean >= float.reduction_mean - 0.5, "{int8:?} against {float:?}");
+    }
+}
+
+/// The README's table is what the demo shows, up to what another processor's rounding may change.
+#[test]
+fn the_readme_tells_the_numbers_of_the_demo() {
+    let readme = include_str!("../../README.md");
+    let mut checked = 0;
+    for line in readme.lines().filter(|line| VEHICLES.iter().any(|vehicle| line.starts_with(&format!("| {vehicle} |")))) {
+        let cells: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
+        let speed: f64 = cells[2].trim_end_matches('x').parse().expect("a speed");
+        let methods = [Method::FeedforwardFeedback, Method::Ridge, Method::NetInt8, Method::FullInt8];
+        for (cell, method) in cells[4..].iter().zip(methods) {
+            let found = row(cells[0], cells[1], speed, method);
+            let (mean, worst) = cell.split_once(" / ").expect("mean / worst");
+            let near =
+                |text: &str, value: f64, tolerance: f64| (text.parse::<f64>().expect("a number") - value).abs() <= tolerance;
+            assert!(near(mean, found.reduction_mean, 0.3) && near(worst, found.reduction_worst, 2.0), "{line}: {found:?}");
+            checked += 1;
+        }
+    }
+    assert!(checked >= 24, "the README has a table of the demo");
+}
+
+/// The file that the demo wrote, over one of its test strokes, on the emulated board.
+#[test]
+fn a_flight_of_the_trained_model_has_the_same_bits_on_the_board() {
+    static ONE_BOARD: Mutex<()> = Mutex::new(());
+    let _one = ONE_BOARD.lock();
+    let results = &*RESULTS;
+    let file = std::fs::read(folder().join("models/crazyflie-stock-lab-seed1.impromptu")).expect("the demo's model");
+    let model = Model::from_bytes(&file).expect("a model");
+    let vehicle = Vehicle::named("crazyflie").expect("a vehicle");
+    let plant = Loop::new(vehicle, "stock", Condition::named("lab").expect("a condition")).expect("a loop");
+    let trajectories = strokes(results.seed + 1000, 1, 1.0, plant.rate_hz()).expect("a stroke");
+    let plan = FlightPlan { record: true, ..FlightPlan::new(&trajectories[0], 5).with(&model, Lanes::BOTH) };
+    let records = plant.fly(&[plan]).expect("a flight");
+    let recorded = records[0].recorded.as_ref().expect("a recording");
+    let report = board::fly_again("trained", Some(&file), recorded).expect("the same bits");
+    golden::announce(&format!("trained model on the board: {report}"));
+}
