@@ -186,7 +186,7 @@ impl Default for Recipe {
             stride: 5,
             excitations: vec![strokes(1.0), strokes(1.35), strokes(1.7)],
             ridge_penalty: 1e-6,
-            network: TrainingSettings { epochs: 30, learning_rate: 2e-3, ..TrainingSettings::default() },
+            network: TrainingSettings { epochs: 45, learning_rate: 2e-3, ..TrainingSettings::default() },
             weight_decays: vec![0.03, 0.2],
             shares: vec![1.0, 0.85, 0.7],
             fine_tuning: TrainingSettings {

@@ -52,7 +52,7 @@ fn outputs(lane: LaneDescription, errors: impl IntoIterator<Item = [f32; 2]>) ->
     let axis = &lane.axes()[0];
     let mut state = AxisState::REST;
     let step = |errors| {
-        let output = state.step(lane, axis, errors, 0.01, true);
+        let output = state.step(lane, axis, errors, 1.0, 0.01, true);
         state.applied(lane, output);
         output
     };
