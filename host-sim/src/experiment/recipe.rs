@@ -107,7 +107,7 @@ impl Default for LaneRecipe {
         Self {
             excitation: Excitation {
                 signal: Signal::Multisine,
-                flights: 4,
+                flights: 10,
                 seconds: 90.0,
                 max_speed: 1.5,
                 max_acceleration: 5.0,
@@ -118,8 +118,8 @@ impl Default for LaneRecipe {
             efforts: vec![6e-3, 1.2e-2],
             velocity_weights: vec![0.05, 0.2],
             noise_factors: vec![2.0],
-            fast_limits: vec![0.15, 0.2, 0.3],
-            authority_scales: vec![20.0],
+            fast_limits: vec![0.15, 0.4],
+            authority_scales: vec![30.0],
             authority_decay: 0.97,
             integral_limit: 0.3,
             design: DesignSettings::default(),
