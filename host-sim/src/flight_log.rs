@@ -169,9 +169,7 @@ impl FlightLog {
             writer.write_record(cells.map(|value| value.to_string())).map_err(in_csv)?;
         }
         let bytes = writer.into_inner().map_err(|error| in_file(error.into_error()))?;
-        let beside = path.with_extension("csv.part");
-        std::fs::write(&beside, bytes).map_err(in_file)?;
-        std::fs::rename(&beside, path).map_err(in_file)
+        impromptu_model_export::replacement::replace(path, &bytes).map_err(in_file)
     }
 
     /// Reads a log and brings it to `rate_hz` rows a second by linear interpolation between its rows.

@@ -168,16 +168,21 @@ pub fn best_in_flight(
         .into_iter()
         .flat_map(|plant| validation.chunks(recipe.validation_strokes.max(1)).map(move |trajectories| (plant, trajectories)))
         .collect();
+    let baselines: Vec<Vec<f64>> = kinds
+        .iter()
+        .map(|(plant, trajectories)| plant.errors(trajectories, None, 1.0, seed))
+        .collect::<Result<_, _>>()
+        .map_err(FlightsError::from)?;
     let fly = |network: &FloatNetwork| -> Result<Vec<f64>, BuildError> {
         let description = describe(recipe, plant, rows, None, "candidate", "", seed);
         let bytes = encode(&description, Some(network), Precision::Float, &rows.calibration)?;
         let model = Model::from_bytes(&bytes).map_err(ExportError::Refused)?;
         kinds
             .iter()
-            .map(|(plant, trajectories)| {
-                let baseline = plant.errors(trajectories, None, 1.0, seed).map_err(FlightsError::from)?;
+            .zip(&baselines)
+            .map(|((plant, trajectories), baseline)| {
                 let errors = plant.errors(trajectories, Some((&model, lanes)), 1.0, seed).map_err(FlightsError::from)?;
-                Ok(reduction(&baseline, &errors).0)
+                Ok(reduction(baseline, &errors).0)
             })
             .collect()
     };
