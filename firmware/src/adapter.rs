@@ -16,6 +16,9 @@ use crate::{
 /// Sub-rate ticks of measured and reference history that features can read.
 pub const HISTORY: usize = 16;
 
+/// Bound of what lowers the feedback lane's authority: a millionth of it is left.
+const VIGOUR_LIMIT: f32 = 1e6;
+
 /// Which lanes act.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Lanes {
@@ -77,7 +80,7 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
     correction: [f32; MAX_OUTPUTS],
     saturations: u32,
     loop_gain: f32,
-    /// Recent peak of what is desired of the loop ([`crate::model::Authority`]).
+    /// Recent peak of what is desired of the loop and of its errors ([`crate::model::Authority`]).
     vigour: f32,
     scratch: Scratch,
 }
@@ -255,15 +258,18 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         outputs.map(finite_or_zero)
     }
 
-    /// Share of the fast clamps that the feedback lane may use at this tick.
-    fn authority<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>) -> f32 {
+    /// Share of the fast clamps that the feedback lane may use at this tick, at which its axes have these errors.
+    fn authority<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, errors: &[[f32; MAX_ERRORS]; MAX_AXES]) -> f32 {
         let Some(layout) = &self.model.card().lane else { return 1.0 };
         let authority = &layout.authority;
-        let values = authority.channels.iter().map(|&channel| preview.channel(tick, usize::from(channel)));
-        let now = finite_or_zero(values.fold(0.0, |sum, value| sum + value * value));
+        let desired = authority.channels.iter().map(|&channel| preview.channel(tick, usize::from(channel)) / authority.scale);
+        let strayed = errors.iter().map(|errors| errors[0] / authority.error_scale);
+        let now = desired.chain(strayed).fold(0.0, |sum, value| sum + value * value);
+        // Also what is no number counts as far astray; the bound lets the lane come back in seconds.
+        let now = if now < VIGOUR_LIMIT { now } else { VIGOUR_LIMIT };
         let past = self.vigour * authority.decay;
         self.vigour = if now > past { now } else { past };
-        1.0 / (1.0 + self.vigour / (authority.scale * authority.scale))
+        1.0 / (1.0 + self.vigour * self.vigour)
     }
 
     /// The feedback lane's output on each of its axes.
@@ -275,9 +281,8 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         let whole = timing.measurement_delay_ticks as i32;
         let share = timing.measurement_delay_ticks - whole as f32;
         let engaged = self.lanes.feedback && self.feedback_weight > 0.0;
-        let authority = self.authority(tick, preview);
-        for ((axis, state), output) in lane.axes().iter().zip(&mut self.axes).zip(&mut outputs) {
-            let mut errors = [0.0; MAX_ERRORS];
+        let mut errors = [[0.0; MAX_ERRORS]; MAX_AXES];
+        for (axis, errors) in lane.axes().iter().zip(&mut errors) {
             for (error, &(measured_channel, desired_channel)) in errors.iter_mut().zip(&axis.layout().errors) {
                 let channel = usize::from(desired_channel);
                 let newer = preview.channel(tick.wrapping_sub(whole), channel);
@@ -285,6 +290,9 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
                 let then = newer + (older - newer) * share;
                 *error = measured.get(usize::from(measured_channel)).copied().unwrap_or(then) - then;
             }
+        }
+        let authority = self.authority(tick, preview, &errors);
+        for (((axis, state), errors), output) in lane.axes().iter().zip(&mut self.axes).zip(errors).zip(&mut outputs) {
             *output = state.step(lane, axis, errors, authority, dt, engaged);
         }
         outputs

@@ -97,7 +97,7 @@ impl AxisState {
     }
 
     /// Takes this tick's errors (in the order of the layout) and returns the lane's output on this axis.
-    /// `authority` (0..=1) scales the fast clamp; `dt` is the reference's period, s. While not `engaged` the lags stay warm and the integral stands still: a lane that is faded
+    /// `authority` (0..=1) scales the fast clamp and what is integrated; `dt` is the reference's period, s. While not `engaged` the lags stay warm and the integral stands still: a lane that is faded
     /// out must not lose its slow part at once; [`AxisState::release`] empties it afterwards.
     pub fn step(
         &mut self,
@@ -125,7 +125,7 @@ impl AxisState {
         let fast_limit = layout.fast_limit * authority;
         let bounded = clamp(fast, -fast_limit, fast_limit);
         self.clamped = bounded != fast;
-        let increment = self.errors[0][0] * dt;
+        let increment = self.errors[0][0] * dt * authority;
         // Only its own clamp stops the integral: a constant disturbance larger than the fast clamp must still be absorbed. The integral
         // itself is bounded, so that neither a long nor a single huge error can wind it up.
         if engaged {

@@ -116,6 +116,8 @@ pub struct AuthorityDescription {
     pub channels: Vec<u8>,
     /// Magnitude of the channels at which half of the clamp is left, in their unit.
     pub scale: f32,
+    /// Magnitude of the errors at which half of the clamp is left, in the errors' unit.
+    pub error_scale: f32,
     /// Factor on the recent peak in a reference tick, 0..1.
     pub decay: f32,
 }
@@ -123,7 +125,7 @@ pub struct AuthorityDescription {
 impl Default for AuthorityDescription {
     /// Full authority always.
     fn default() -> Self {
-        Self { channels: Vec::new(), scale: 1.0, decay: 0.0 }
+        Self { channels: Vec::new(), scale: 1.0, error_scale: f32::MAX, decay: 0.0 }
     }
 }
 

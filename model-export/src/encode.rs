@@ -198,6 +198,7 @@ fn lane(description: &Description, blob: &mut BlobWriter) -> Result<Option<LaneL
     let authority = Authority {
         channels: bounded(&lane.authority.channels, "lane authority channels")?,
         scale: lane.authority.scale,
+        error_scale: lane.authority.error_scale,
         decay: lane.authority.decay,
     };
     Ok(Some(LaneLayout { lags: lags as u8, axes: bounded(&axes, "lane axes")?, authority, margins: lane.margins }))

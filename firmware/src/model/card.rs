@@ -195,8 +195,10 @@ pub struct Margins {
     pub modulus: f32,
 }
 
-/// How much of the fast clamps the lane may use: 1 / (1 + v / scale²), where v is the recent peak of Σ channel², which decays by
-/// `decay` each tick. The lane is linear round calm flight; where much is desired of the loop it must not pull as hard.
+/// How much of the fast clamps the lane may use, and how fast it integrates: 1 / (1 + v²), where v is the recent peak of
+/// Σ channel² / scale² + Σ error² / error_scale² (of each axis the first error), which decays by `decay` each tick. The lane is linear
+/// round calm flight: where much is desired of the loop, or where it has left the desired trajectory by more than a linear loop
+/// would, it must not pull as hard. A vehicle whose motors saturate would else be pulled into a tumble.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Authority {
@@ -204,6 +206,8 @@ pub struct Authority {
     pub channels: Vec<u8, MAX_AXES>,
     /// Magnitude of the channels at which half of the clamp is left, in their unit.
     pub scale: f32,
+    /// Magnitude of the errors at which half of the clamp is left, in the errors' unit.
+    pub error_scale: f32,
     /// Factor on the recent peak in a reference tick, 0..1.
     pub decay: f32,
 }

@@ -116,7 +116,13 @@ fn lane(card: &Card<'_>, lane: &LaneLayout) -> Result<(), Refusal> {
     if let Some(&found) = authority.channels.iter().find(|&&channel| usize::from(channel) >= card.signals.desired.len()) {
         return Err(Refusal::Index { what: "lane authority channel", found });
     }
-    if !(authority.scale.is_finite() && authority.scale > 0.0 && authority.decay >= 0.0 && authority.decay < 1.0) {
+    if !(authority.scale.is_finite()
+        && authority.scale > 0.0
+        && authority.error_scale.is_finite()
+        && authority.error_scale > 0.0
+        && authority.decay >= 0.0
+        && authority.decay < 1.0)
+    {
         return Err(Refusal::Value { what: "lane authority" });
     }
     for (index, axis) in lane.axes.iter().enumerate() {

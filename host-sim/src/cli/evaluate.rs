@@ -8,13 +8,13 @@ use impromptu_firmware::adapter::Lanes;
 use serde::Serialize;
 
 use super::{
-    Session, fly,
+    Session,
     model_file::{ModelFile, method},
     output::{number, table},
     situation::{Situation, milliseconds, speed},
 };
 use crate::{
-    experiment::{Loop, Purpose, demo::Observer as _},
+    experiment::{Loop, Purpose, demo::Observer as _, per_flight},
     report::{Method, PerFlight, Row, summarise},
     trajectory::{Trajectory, strokes},
 };
@@ -124,12 +124,7 @@ impl Flights<'_> {
     }
 
     fn scored(&self, method: Method, errors: &[f64]) -> Vec<PerFlight> {
-        let all = self.trajectories.iter().zip(errors).zip(self.baseline);
-        all.map(|((trajectory, &error), baseline)| PerFlight {
-            reduction: 100.0 * (1.0 - error / baseline),
-            ..fly::flight(self.plant, trajectory, self.speed, method, error, self.seed)
-        })
-        .collect()
+        per_flight(self.plant, self.trajectories, self.speed, method, errors, self.baseline, self.seed)
     }
 }
 

@@ -15,10 +15,9 @@ use super::{
     trajectory,
 };
 use crate::{
-    experiment::{Loop, Purpose},
+    experiment::{Loop, Purpose, per_flight},
     report::{Method, PerFlight},
     rollout::{FlightPlan, FlightRecord},
-    trajectory::Trajectory,
 };
 
 /// Arguments of `fly`.
@@ -124,10 +123,11 @@ impl Fly {
             session.console.note(&format!("log: {}", path.display()));
         }
         let baseline = records[0].rms;
-        let flights = records.iter().zip(methods).map(|(record, method)| PerFlight {
-            reduction: 100.0 * (1.0 - record.rms / baseline),
-            ..flight(&plant, &trajectory, self.speed, method, record.rms, seed)
-        });
+        let trajectory = std::slice::from_ref(&trajectory);
+        let flights = records
+            .iter()
+            .zip(methods)
+            .flat_map(|(record, method)| per_flight(&plant, trajectory, self.speed, method, &[record.rms], &[baseline], seed));
         let flown = Flown {
             model: file.as_ref().map(ModelFile::name),
             extra_delay_ms: self.extra_delay_ms,
@@ -135,21 +135,6 @@ impl Fly {
             log: self.log,
         };
         session.format.print(&flown, || text(&flown))
-    }
-}
-
-/// A flight as it is reported; the reduction is 0.
-pub(super) fn flight(plant: &Loop, trajectory: &Trajectory, speed: f64, method: Method, rms: f64, seed: u64) -> PerFlight {
-    PerFlight {
-        vehicle: plant.vehicle.name.clone(),
-        gains: plant.gains.clone(),
-        condition: plant.condition.name.clone(),
-        speed,
-        method,
-        trajectory: trajectory.name.clone(),
-        rms_cm: 100.0 * rms,
-        reduction: 0.0,
-        seed,
     }
 }
 

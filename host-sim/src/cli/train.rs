@@ -114,15 +114,14 @@ impl Train {
             Some(plant) => validation_strokes(&recipe, &recipe.validation_speeds, plant.rate_hz(), seed)?,
             None => Vec::new(),
         };
-        let in_flight = |ridge: &FloatNetwork, candidates: &[FloatNetwork], rows: &Rows| {
+        let in_flight = origin.plant.as_ref().map(|plant| {
             let flight_seed = derived(seed, Purpose::Validation);
-            let flown = origin
-                .plant
-                .as_ref()
-                .map(|plant| best_in_flight(&recipe, plant, &validation, flight_seed, ridge, candidates, rows));
-            flown.and_then(Result::ok).unwrap_or(0)
-        };
-        let judge: Option<&Judge<'_>> = if origin.plant.is_some() { Some(&in_flight) } else { None };
+            let (recipe, validation) = (&recipe, &validation);
+            move |ridge: &FloatNetwork, candidates: &[FloatNetwork], rows: &Rows| {
+                best_in_flight(recipe, plant, validation, flight_seed, ridge, candidates, rows)
+            }
+        });
+        let judge = in_flight.as_ref().map(|judge| judge as &Judge<'_>);
         let learned = learn(&recipe, &logs, origin.delay_s, origin.smoothing_s, judge, &mut watched(session, &recipe))?;
         session.console.finish();
         let describe = |lane: Option<&LaneDescription>, remarks: &str| {

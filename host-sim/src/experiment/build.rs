@@ -109,7 +109,7 @@ pub fn build(recipe: &Recipe, plant: &Loop, seed: u64, progress: &mut dyn FnMut(
     let validation = validation_strokes(&recipe, &recipe.validation_speeds, plant.rate_hz(), seed)?;
     let flight_seed = derived(seed, Purpose::Validation);
     let judge = |ridge: &FloatNetwork, candidates: &[FloatNetwork], rows: &Rows| {
-        best_in_flight(&recipe, plant, &validation, flight_seed, ridge, candidates, rows).unwrap_or(0)
+        best_in_flight(&recipe, plant, &validation, flight_seed, ridge, candidates, rows)
     };
     let learned = learn(&recipe, &logs, delay, smoothing(&recipe, plant), Some(&judge), progress)?;
     drop(logs);
@@ -120,7 +120,8 @@ pub fn build(recipe: &Recipe, plant: &Loop, seed: u64, progress: &mut dyn FnMut(
         encode(&describe(Some(lane)), Some(&learned.quantised), Precision::Int8, &learned.rows.calibration)
     });
 
-    let wide = LaneRecipe { fast_limits: vec![0.1, 0.3], authority_scales: vec![1e3], ..recipe.lane.clone() };
+    // The feed-forward leaves larger errors, for which the network's lane would be unfairly weak.
+    let wide = LaneRecipe { fast_limits: vec![0.1, 0.3], authority_scales: vec![1e3], error_scale: 0.2, ..recipe.lane.clone() };
     let nominal = validation_strokes(&recipe, &[1.0], plant.rate_hz(), seed)?;
     let feedforward_lane = strongest_lane(&wide, plant, &dithered, &nominal, flight_seed, &|lane| {
         feedforward(&plant.settings, describe(Some(lane)))

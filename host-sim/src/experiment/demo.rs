@@ -15,7 +15,6 @@ use super::{
     evaluation::{evaluate, model_card, traces},
     files::write_model_files,
     flights::Loop,
-    models::describe,
     recipe::Recipe,
 };
 use crate::{
@@ -121,7 +120,7 @@ pub fn run(settings: &DemoSettings, observer: &dyn Observer) -> anyhow::Result<R
             let speed = settings.speeds.first().copied().unwrap_or(1.0);
             let trajectories = strokes(test_seed, traced, speed, plant.rate_hz())?;
             if let Some(out) = &settings.out {
-                write_models(out, settings, plant, &built, *seed)?;
+                write_models(out, plant, &built, *seed)?;
             }
             Ok(Outcome {
                 flights,
@@ -217,10 +216,8 @@ fn folder(out: &Path, name: &str) -> anyhow::Result<PathBuf> {
 }
 
 /// The flashed model of a loop, with the float network, its description and the calibration rows beside it.
-fn write_models(out: &Path, settings: &DemoSettings, plant: &Loop, built: &Built, seed: u64) -> anyhow::Result<()> {
-    let lane = built.lane.as_ref().ok().map(|choice| &choice.lane);
-    let description = describe(&settings.recipe, plant, &built.learned.rows, lane, "net", "", seed);
+fn write_models(out: &Path, plant: &Loop, built: &Built, seed: u64) -> anyhow::Result<()> {
     let name = format!("{}-{}-{}-seed{seed}", plant.vehicle.name, plant.gains, plant.condition.name);
-    write_model_files(&folder(out, "models")?, &name, &built.learned, &description, &built.models.int8)?;
+    write_model_files(&folder(out, "models")?, &name, &built.learned, &built.models.description, &built.models.int8)?;
     Ok(())
 }

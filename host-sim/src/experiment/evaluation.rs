@@ -65,21 +65,34 @@ pub fn evaluate(
                 plant.errors(trajectories, Some((&model, lanes)), 1.0, flight_seed)?
             }
         };
-        for ((trajectory, error), baseline) in trajectories.iter().zip(&errors).zip(&baseline) {
-            flights.push(PerFlight {
-                vehicle: plant.vehicle.name.clone(),
-                gains: plant.gains.clone(),
-                condition: plant.condition.name.clone(),
-                speed,
-                method,
-                trajectory: trajectory.name.clone(),
-                rms_cm: 100.0 * error,
-                reduction: 100.0 * (1.0 - error / baseline),
-                seed,
-            });
-        }
+        flights.extend(per_flight(plant, trajectories, speed, method, &errors, &baseline, seed));
     }
     Ok(flights)
+}
+
+/// Flights as they are reported, of their RMS errors and the baseline's over the same trajectories, m.
+pub fn per_flight(
+    plant: &Loop,
+    trajectories: &[Trajectory],
+    speed: f64,
+    method: Method,
+    errors: &[f64],
+    baseline: &[f64],
+    seed: u64,
+) -> Vec<PerFlight> {
+    let flights = trajectories.iter().zip(errors).zip(baseline);
+    let report = |((trajectory, error), baseline): ((&Trajectory, &f64), &f64)| PerFlight {
+        vehicle: plant.vehicle.name.clone(),
+        gains: plant.gains.clone(),
+        condition: plant.condition.name.clone(),
+        speed,
+        method,
+        trajectory: trajectory.name.clone(),
+        rms_cm: 100.0 * error,
+        reduction: 100.0 * (1.0 - error / baseline),
+        seed,
+    };
+    flights.map(report).collect()
 }
 
 /// Full records of a few flights: the baseline, the network lane alone, and both lanes.

@@ -200,7 +200,12 @@ fn describe(designs: &[&LaneDesign; 3], fast_limit: f64, scale: f64, recipe: &La
         })
         .collect();
     // Desired accelerations, whose effect on the loop outlasts them.
-    let authority = AuthorityDescription { channels: vec![6, 7, 8], scale: scale as f32, decay: recipe.authority_decay as f32 };
+    let authority = AuthorityDescription {
+        channels: vec![6, 7, 8],
+        scale: scale as f32,
+        error_scale: recipe.error_scale as f32,
+        decay: recipe.authority_decay as f32,
+    };
     LaneDescription { axes, authority, margins: worst_margins(designs) }
 }
 
@@ -239,15 +244,17 @@ struct Score {
     over_network: f64,
 }
 
-/// Flies every candidate in the cases given over the validation trajectories.
-fn scores(
-    candidates: &[Candidate],
-    cases: &[Case],
+/// All designs of a recipe from dithered logs, and how each flew over the validation trajectories in every case.
+fn flown(
+    recipe: &LaneRecipe,
     plant: &Loop,
+    logs: &[FlightLog],
     validation: &[Trajectory],
     seed: u64,
     encode: &(dyn Fn(&LaneDescription) -> Result<Vec<u8>, ExportError> + Sync),
-) -> Result<Vec<Score>, LaneRefusal> {
+) -> Result<(Vec<Candidate>, Vec<Score>), LaneRefusal> {
+    let candidates = candidates(recipe, logs)?;
+    let cases = &CASES;
     let loops: Vec<Loop> =
         cases.iter().map(|case| Loop { condition: plant.condition.delayed(case.delay_s), ..plant.clone() }).collect();
     let baselines: Vec<Vec<f64>> =
@@ -260,7 +267,7 @@ fn scores(
         }
         None => Vec::new(),
     };
-    candidates
+    let scores = candidates
         .par_iter()
         .map(|candidate| {
             let bytes = encode(&candidate.lane)?;
@@ -284,7 +291,8 @@ fn scores(
             }
             Ok(score)
         })
-        .collect()
+        .collect::<Result<_, LaneRefusal>>()?;
+    Ok((candidates, scores))
 }
 
 /// A nominal flight may lose this much, per cent of the baseline's error, against the network lane alone; what the worst one loses
@@ -304,8 +312,7 @@ pub fn choose_lane(
     seed: u64,
     encode: &(dyn Fn(&LaneDescription) -> Result<Vec<u8>, ExportError> + Sync),
 ) -> Result<LaneChoice, LaneRefusal> {
-    let candidates = candidates(&recipe.lane, logs)?;
-    let scores = scores(&candidates, &CASES, plant, validation, seed, encode)?;
+    let (candidates, scores) = flown(&recipe.lane, plant, logs, validation, seed, encode)?;
     let admissible = |score: &Score| score.worst >= 0.0;
     if let Some(choice) = best(&candidates, &scores, &admissible) {
         return Ok(choice);
@@ -330,8 +337,7 @@ pub fn strongest_lane(
     seed: u64,
     encode: &(dyn Fn(&LaneDescription) -> Result<Vec<u8>, ExportError> + Sync),
 ) -> Result<LaneChoice, LaneRefusal> {
-    let candidates = candidates(recipe, logs)?;
-    let scores = scores(&candidates, &CASES, plant, validation, seed, encode)?;
+    let (candidates, scores) = flown(recipe, plant, logs, validation, seed, encode)?;
     best(&candidates, &scores, &|_| true).ok_or(LaneRefusal::Flights {
         designs: 0,
         worst: f64::NEG_INFINITY,

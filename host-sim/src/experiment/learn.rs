@@ -3,7 +3,7 @@
 use impromptu_firmware::quadrotor::REFERENCE;
 use impromptu_model_export::FloatNetwork;
 
-use super::recipe::Recipe;
+use super::{build::BuildError, recipe::Recipe};
 use crate::{
     examples::{ExampleSettings, examples},
     flight_log::FlightLog,
@@ -22,6 +22,9 @@ pub enum LearnError {
     /// The training failed.
     #[error("network: {0}")]
     Training(#[from] TrainingError),
+    /// The candidates could not be judged in flight.
+    #[error("choosing the network in flight: {0}")]
+    Judge(#[source] Box<dyn std::error::Error + Send + Sync>),
     /// The recipe asks for no network.
     #[error("recipe: `weight_decays` and `shares` name no candidate; give at least one of each")]
     NoCandidate,
@@ -47,7 +50,7 @@ pub struct Learned {
 const CALIBRATION_ROWS: usize = 512;
 
 /// A choice among networks: called with the ridge regression and the candidates, answers with a candidate's index.
-pub type Judge<'a> = dyn Fn(&FloatNetwork, &[FloatNetwork], &Rows) -> usize + 'a;
+pub type Judge<'a> = dyn Fn(&FloatNetwork, &[FloatNetwork], &Rows) -> Result<usize, BuildError> + 'a;
 
 /// What a description needs of the training rows.
 #[derive(Clone, Debug)]
@@ -102,7 +105,10 @@ pub fn learn(
         let network = train(&settings, &training, &validation, progress)?.network;
         candidates.extend(recipe.shares.iter().map(|&share| shared(&network, share)));
     }
-    let chosen = judge.map_or_else(|| best_on_rows(&candidates, &validation), |judge| judge(&ridge, &candidates, &rows));
+    let chosen = match judge {
+        Some(judge) => judge(&ridge, &candidates, &rows).map_err(|error| LearnError::Judge(error.into()))?,
+        None => best_on_rows(&candidates, &validation),
+    };
     let network = candidates.into_iter().nth(chosen).ok_or(LearnError::NoCandidate)?;
     let quantised = fine_tune(&network, &recipe.fine_tuning, &training, &validation, progress)?.network;
     Ok(Learned { ridge, network, quantised, rows })

@@ -14,7 +14,7 @@ mod models;
 mod recipe;
 
 pub use build::{BuildError, Built, Purpose, best_in_flight, build, derived, smoothing, training_logs, validation_strokes};
-pub use evaluation::{EvaluationError, evaluate, model_card, traces};
+pub use evaluation::{EvaluationError, evaluate, model_card, per_flight, traces};
 pub use files::write_model_files;
 pub use flights::{FlightsError, Loop, reduction};
 pub use lane::{LaneChoice, LaneRefusal, choose_lane, dithered_logs, strongest_lane};

@@ -29,6 +29,8 @@ pub struct ModelSet {
     pub float: Vec<u8>,
     /// Network, int8.
     pub int8: Vec<u8>,
+    /// What the int8 file says of itself.
+    pub description: Description,
 }
 
 /// Limits above the largest correction in training.
@@ -60,6 +62,7 @@ impl ModelSet {
             ridge: make("ridge", &learned.ridge, Precision::Float)?,
             float: make("net_f32", &learned.network, Precision::Float)?,
             int8: make("net_int8", &learned.quantised, Precision::Int8)?,
+            description: describe("net_int8", lane),
         })
     }
 }

@@ -94,7 +94,9 @@ pub struct LaneRecipe {
     pub fast_limits: Vec<f64>,
     /// Desired accelerations at which half of the fast clamp is left, tried, m/s².
     pub authority_scales: Vec<f64>,
-    /// Decay of the recent peak of the desired acceleration in a reference tick.
+    /// Error of the position at which half of the fast clamp is left, m.
+    pub error_scale: f64,
+    /// Decay of the recent peak of desired acceleration and error in a reference tick.
     pub authority_decay: f64,
     /// Clamp of the integral part, m.
     pub integral_limit: f64,
@@ -118,8 +120,9 @@ impl Default for LaneRecipe {
             efforts: vec![6e-3, 1.2e-2],
             velocity_weights: vec![0.05, 0.2],
             noise_factors: vec![2.0],
-            fast_limits: vec![0.15, 0.4],
-            authority_scales: vec![30.0],
+            fast_limits: vec![0.06, 0.1],
+            authority_scales: vec![6.0],
+            error_scale: 0.05,
             authority_decay: 0.97,
             integral_limit: 0.3,
             design: DesignSettings::default(),

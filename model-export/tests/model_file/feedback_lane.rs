@@ -6,7 +6,11 @@ use impromptu_firmware::{
     model::{Model, Output},
     preview::{EndRule, Preview},
 };
-use impromptu_model_export::{Description, Precision, description::LaneDescription, encode};
+use impromptu_model_export::{
+    Description, Precision,
+    description::{AuthorityDescription, LaneDescription},
+    encode,
+};
 use proptest::prelude::*;
 
 use crate::fixture::{description, lane, table};
@@ -89,6 +93,32 @@ proptest! {
         prop_assert_eq!(found[0].to_bits(), (expected + 0.0).to_bits());
         prop_assert_eq!(found[1], expected);
     }
+}
+
+/// Where much is desired, or where the loop has strayed, the fast clamp shrinks by 1 / (1 + v²); it comes back as the peak decays.
+#[test]
+fn authority_falls_with_what_is_desired_and_with_the_error() {
+    let cautious = |error_scale| {
+        let mut p = lane([vec![-100.0], vec![0.0]], vec![0.0], 0.0);
+        p.axes[0].fast_limit = 1.0;
+        p.authority = AuthorityDescription { channels: vec![1], scale: 2.0, error_scale, decay: 0.5 };
+        p
+    };
+    let shrunk = |v: f32| 1.0 / (1.0 + v * v);
+    // A desired velocity of 4 for one tick, twice the scale; the measurement is 0.1 below what is desired all the time.
+    let pulse = |tick: i32| [0.0, if tick == 5 { 4.0 } else { 0.0 }];
+    let found = corrections(cautious(f32::MAX), 0.0, 30, pulse, |tick| [-0.1, pulse(tick)[1]]);
+    for (tick, v) in [(4, 0.0), (5, 4.0), (6, 2.0), (7, 1.0), (25, 0.0)] {
+        assert!((found[tick] - shrunk(v)).abs() < 1e-4, "{tick}: {} against {}", found[tick], shrunk(v));
+    }
+    // An error of twice the scale for one tick, then a tenth of it.
+    let found = corrections(cautious(0.5), 0.0, 30, |_| [0.0; 2], |tick| [if tick == 5 { -1.0 } else { -0.1 }, 0.0]);
+    for (tick, v) in [(4, 0.04), (5, 4.0), (6, 2.0), (25, 0.04)] {
+        assert!((found[tick] - shrunk(v)).abs() < 1e-4, "{tick}: {} against {}", found[tick], shrunk(v));
+    }
+    // Errors beyond all numbers leave next to nothing, and not for ever.
+    let found = corrections(cautious(0.5), 0.0, 60, |_| [0.0; 2], |tick| [if tick == 5 { f32::NAN } else { -0.1 }, 0.0]);
+    assert!(found[5].abs() < 1e-6 && found[6].abs() < 1e-6 && found[50] > 0.9, "{found:?}");
 }
 
 /// A ramp that is tracked perfectly and measured late has no error, and one that lags has its lag.
