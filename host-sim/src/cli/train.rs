@@ -124,6 +124,10 @@ impl Train {
         let judge = in_flight.as_ref().map(|judge| judge as &Judge<'_>);
         let learned = learn(&recipe, &logs, origin.delay_s, origin.smoothing_s, judge, &mut watched(session, &recipe))?;
         session.console.finish();
+        for log in &learned.broken {
+            let error = log.largest_error;
+            session.console.note(&format!("{}: left out, its loop broke down (largest error {error:.2} m)", log.name));
+        }
         let describe = |lane: Option<&LaneDescription>, remarks: &str| {
             describe_model(&self.name, &recipe, &origin, &learned, lane, remarks, seed)
         };

@@ -110,6 +110,9 @@ pub fn run(settings: &DemoSettings, observer: &dyn Observer) -> anyhow::Result<R
             let begin = Instant::now();
             let built = build(&settings.recipe, plant, *seed, &mut |_| advance(1)).with_context(|| name.clone())?;
             let trained = begin.elapsed().as_secs_f64();
+            if !built.learned.broken.is_empty() {
+                observer.stage(&format!("{name}: {} training flights broke down, left out", built.learned.broken.len()));
+            }
             observer.stage(&match &built.lane {
                 Ok(choice) => format!("{name}: feedback lane {}", choice.design),
                 Err(reason) => format!("{name}: written without feedback lane: {reason}"),

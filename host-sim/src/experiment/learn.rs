@@ -3,7 +3,11 @@
 use impromptu_firmware::quadrotor::REFERENCE;
 use impromptu_model_export::FloatNetwork;
 
-use super::{build::BuildError, recipe::Recipe};
+use super::{
+    breakdown::{Breakdown, sound},
+    build::BuildError,
+    recipe::Recipe,
+};
 use crate::{
     examples::{ExampleSettings, examples},
     flight_log::FlightLog,
@@ -29,7 +33,7 @@ pub enum LearnError {
     #[error("recipe: `weight_decays` and `shares` name no candidate; give at least one of each")]
     NoCandidate,
     /// Too few logs.
-    #[error("at least two logs are needed: one is kept to decide when to stop training")]
+    #[error("at least two logs in which the loop did not break down are needed: one is kept to decide when to stop training")]
     OneLog,
 }
 
@@ -44,6 +48,8 @@ pub struct Learned {
     pub quantised: FloatNetwork,
     /// What a description needs of the training rows.
     pub rows: Rows,
+    /// Logs that were left out.
+    pub broken: Vec<Breakdown>,
 }
 
 /// Rows of calibration that are kept.
@@ -80,6 +86,7 @@ pub fn learn(
     judge: Option<&Judge<'_>>,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Learned, LearnError> {
+    let (logs, broken) = sound(logs);
     if logs.len() < 2 {
         return Err(LearnError::OneLog);
     }
@@ -87,7 +94,7 @@ pub fn learn(
     let features = recipe.features();
     let held = |index: usize| index % 4 == 3 || (logs.len() < 4 && index + 1 == logs.len());
     let pick = |wanted: bool| -> Vec<&FlightLog> {
-        logs.iter().enumerate().filter(|(index, _)| held(*index) == wanted).map(|(_, log)| log).collect()
+        logs.iter().enumerate().filter(|(index, _)| held(*index) == wanted).map(|(_, log)| *log).collect()
     };
     let training = examples(&pick(false), &features, &settings)?;
     let validation = examples(&pick(true), &features, &settings)?;
@@ -111,7 +118,7 @@ pub fn learn(
     };
     let network = candidates.into_iter().nth(chosen).ok_or(LearnError::NoCandidate)?;
     let quantised = fine_tune(&network, &recipe.fine_tuning, &training, &validation, progress)?.network;
-    Ok(Learned { ridge, network, quantised, rows })
+    Ok(Learned { ridge, network, quantised, rows, broken })
 }
 
 /// The candidate with the least squared error on rows that it has not seen, each output by its own scale.

@@ -3,6 +3,7 @@
 //! *in* a [`Recipe`] and a [`Loop`]; *out* models and [`crate::report::Results`]; *never* a choice made on the test flights;
 //! *source* Zhou 2017, section V; Li 2017 (30 unseen strokes).
 
+mod breakdown;
 mod build;
 pub mod demo;
 mod evaluation;
@@ -13,6 +14,7 @@ mod learn;
 mod models;
 mod recipe;
 
+pub use breakdown::Breakdown;
 pub use build::{BuildError, Built, Purpose, best_in_flight, build, derived, smoothing, training_logs, validation_strokes};
 pub use evaluation::{EvaluationError, evaluate, model_card, per_flight, traces};
 pub use files::write_model_files;
