@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, anyhow};
+use garde::Validate;
 use serde::de::DeserializeOwned;
 
 use crate::experiment::{Purpose, Recipe, demo::DemoSettings, derived};
@@ -16,7 +17,7 @@ pub(super) struct Configuration {
 impl Configuration {
     /// Reads the file, if one is given; the options win over it.
     pub(super) fn load(file: Option<&Path>, seed: Option<u64>, out: Option<PathBuf>) -> Result<Self> {
-        let mut settings: DemoSettings = file.map(toml).transpose()?.unwrap_or_default();
+        let mut settings: DemoSettings = file.map(checked).transpose()?.unwrap_or_default();
         settings.seed = seed.unwrap_or(settings.seed);
         settings.out = out.or(settings.out);
         Ok(Self { settings })
@@ -45,6 +46,14 @@ impl Configuration {
     }
 }
 
+/// Reads a TOML file and checks its values; refusals name the key.
+pub(super) fn checked<T: DeserializeOwned + Validate<Context = ()>>(path: &Path) -> Result<T> {
+    let value: T = toml(path)?;
+    // Each value that cannot be, as `recipe.divisor: lower than 1`.
+    value.validate().map_err(|report| anyhow!("{}: {}", path.display(), report.to_string().trim_end().replace('\n', "; ")))?;
+    Ok(value)
+}
+
 /// Reads a TOML file; refusals name file, line and key.
 pub(super) fn toml<T: DeserializeOwned>(path: &Path) -> Result<T> {
     let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
@@ -67,6 +76,27 @@ mod tests {
         let read = Configuration::load(Some(&file), None, None).unwrap();
         assert_eq!((read.seed(), read.recipe().stride, read.recipe().window), (5, 3, Recipe::default().window));
         assert_eq!(Configuration::load(Some(&file), Some(6), None).unwrap().seed(), 6);
+    }
+
+    #[test]
+    fn a_value_that_cannot_be_is_refused_with_its_key() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("demo.toml");
+        for (text, key) in [
+            ("strokes = 0", "strokes"),
+            ("speeds = [1.0, -1.0]", "speeds[1]"),
+            ("speeds = []", "speeds"),
+            ("[recipe]\ndivisor = 0", "recipe.divisor"),
+            ("[recipe]\nwindow = [10, -10]", "recipe.window"),
+            ("[recipe]\nwindow = [-2000, 4000]", "recipe.window"),
+            ("[recipe]\nexcitations = []", "recipe.excitations"),
+            ("[recipe.lane]\nfast_limits = [0.1, nan]", "recipe.lane.fast_limits[1]"),
+            ("[recipe.lane]\nerror_scale = 0.0", "recipe.lane.error_scale"),
+        ] {
+            std::fs::write(&file, text).unwrap();
+            let message = format!("{:#}", Configuration::load(Some(&file), None, None).err().expect(text));
+            assert!(message.contains(&format!("demo.toml: {key}: ")), "{message}");
+        }
     }
 
     #[test]

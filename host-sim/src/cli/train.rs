@@ -17,7 +17,7 @@ use serde::Serialize;
 
 use super::{
     Session,
-    configuration::toml,
+    configuration::checked,
     output::table,
     situation::{milliseconds, plant},
 };
@@ -97,7 +97,7 @@ impl Train {
     pub(super) fn run(self, session: &Session) -> Result<()> {
         let seed = session.configuration.seed();
         let mut recipe: Recipe = match &self.recipe {
-            Some(path) => toml(path).context("--recipe")?,
+            Some(path) => checked(path).context("--recipe")?,
             None => session.configuration.recipe().clone(),
         };
         (recipe.network.seed, recipe.fine_tuning.seed) = (seed, seed);

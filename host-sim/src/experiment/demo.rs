@@ -7,6 +7,7 @@ use std::{
 };
 
 use anyhow::Context as _;
+use garde::Validate;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +16,7 @@ use super::{
     evaluation::{evaluate, model_card, traces},
     files::write_model_files,
     flights::Loop,
-    recipe::Recipe,
+    recipe::{Recipe, not_negative, positive},
 };
 use crate::{
     condition::Condition,
@@ -26,29 +27,39 @@ use crate::{
 };
 
 /// What the demo covers.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Validate)]
 #[serde(default, deny_unknown_fields)]
 pub struct DemoSettings {
     /// Seed of everything random.
+    #[garde(skip)]
     pub seed: u64,
     /// Repetitions of training and test, with seeds from `seed` on.
+    #[garde(range(min = 1))]
     pub seeds: u32,
     /// Vehicles.
+    #[garde(length(min = 1))]
     pub vehicles: Vec<String>,
     /// Position gains.
+    #[garde(length(min = 1))]
     pub gains: Vec<String>,
     /// Conditions.
+    #[garde(length(min = 1))]
     pub conditions: Vec<String>,
     /// Speeds of the test strokes.
+    #[garde(length(min = 1), inner(custom(positive)))]
     pub speeds: Vec<f64>,
     /// Test strokes.
+    #[garde(range(min = 1))]
     pub strokes: usize,
     /// Further delay of the whole loop at test time only, ms, flown at the first speed; 0: not flown.
+    #[garde(custom(not_negative))]
     pub extra_delay_ms: f64,
     /// Recipe of the models.
+    #[garde(dive)]
     pub recipe: Recipe,
     /// Folder for model files and flight logs.
     #[serde(skip)]
+    #[garde(skip)]
     pub out: Option<PathBuf>,
 }
 
