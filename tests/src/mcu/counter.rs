@@ -1,6 +1,7 @@
 //! Compiles the cycle model in `tests/cycles` and reads what it counted.
 
 use std::{
+    collections::BTreeMap,
     env,
     ffi::OsString,
     fs,
@@ -28,7 +29,7 @@ pub struct Entry {
     /// Lowest address of the stack that was written; `u64::MAX`: none.
     pub lowest_store: u64,
     /// Executed instructions of each kind.
-    pub kinds: std::collections::BTreeMap<String, u64>,
+    pub kinds: BTreeMap<String, u64>,
 }
 
 impl Entry {

@@ -48,6 +48,8 @@ pub struct Row {
     pub ram_bytes: u64,
     /// Largest difference to the exact outputs.
     pub max_error: f64,
+    /// Executed instructions of each kind (`tests/cycles/instruction.h`), for the first typical input.
+    pub kinds: BTreeMap<String, u64>,
     /// Cycles of each counted input, code and weights in flash: typical rows, then zeros, then far outside of every range.
     #[serde(skip)]
     pub cycles_by_input: Vec<u64>,
@@ -169,6 +171,7 @@ impl<'p> Board<'p> {
             code_bytes: flash_bytes - length as u64,
             ram_bytes: answer.working_memory + (answer.stack_pointer - lowest),
             max_error: net.largest_error(&found.outputs),
+            kinds: entries.first().map(|entry| entry.kinds.clone()).unwrap_or_default(),
             cycles_by_input: entries.iter().map(Entry::cycles_with_waits).collect(),
         })
     }
