@@ -1,5 +1,7 @@
 //! `cargo mcu`: what an evaluation costs on the microcontroller, kernel by kernel and network by network.
 
+use std::process::ExitCode;
+
 use anyhow::{Result, ensure};
 use clap::{Parser, ValueEnum};
 use impromptu_tests::mcu::{measurement::measure, table};
@@ -29,7 +31,17 @@ enum Format {
     Json,
 }
 
-fn main() -> Result<()> {
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("cargo mcu: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> Result<()> {
     let arguments = Arguments::parse();
     let is = |asked: &Option<String>, name: &str| asked.as_ref().is_none_or(|asked| asked == name);
     let results = measure(|kernel, net| is(&arguments.kernel, kernel) && is(&arguments.net, net))?;
