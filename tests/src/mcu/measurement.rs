@@ -40,9 +40,9 @@ pub struct Row {
     pub cycles_ram: Option<u64>,
     /// Modelled cycles if flash had no wait states.
     pub cycles_no_wait: u64,
-    /// Functions, tables and weights.
+    /// Every function that ran, whole, the tables and the weights.
     pub flash_bytes: u64,
-    /// Functions and tables alone.
+    /// Instructions that ran and tables, without weights.
     pub code_bytes: u64,
     /// Static working memory and stack.
     pub ram_bytes: u64,
@@ -149,9 +149,10 @@ impl<'p> Board<'p> {
         let found = self.ask(kernel, net, false, &net.inputs, None)?;
         let (answer, entries, used) = self.count(kernel, net, false, &counted)?;
         let length = self.images.get(&kernel.form.image_name(net)).copied().unwrap_or_default();
-        let (needed, reads_image) = self.symbols.needed(&used, answer.image, length as u64);
+        let needed = self.symbols.needed(&used, answer.image, length as u64);
         // Who does not read the image has the same weights among its constants.
-        let flash_bytes = if reads_image { needed + length as u64 } else { needed };
+        let weights = length as u64;
+        let (beside, inside) = if needed.reads_image { (weights, 0) } else { (0, weights) };
         let cycles_ram = if kernel.takes_weights_in_ram() && length <= RAM_FOR_WEIGHTS {
             let (in_ram, entries, _) = self.count(kernel, net, true, &counted)?;
             ensure!(in_ram.outputs == answer.outputs, "other outputs with the weights in RAM than in flash");
@@ -167,8 +168,8 @@ impl<'p> Board<'p> {
             cycles_flash: most(&entries, Entry::cycles_with_waits),
             cycles_ram,
             cycles_no_wait: most(&entries, |entry| entry.cycles),
-            flash_bytes,
-            code_bytes: flash_bytes - length as u64,
+            flash_bytes: needed.whole + beside,
+            code_bytes: needed.path - inside,
             ram_bytes: answer.working_memory + (answer.stack_pointer - lowest),
             max_error: net.largest_error(&found.outputs),
             kinds: entries.first().map(|entry| entry.kinds.clone()).unwrap_or_default(),

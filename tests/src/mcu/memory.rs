@@ -56,15 +56,16 @@ impl Symbols {
         Ok(Self { functions, constants, stack_end })
     }
 
-    /// Bytes of the functions that were executed, each counted whole, and of the tables that were read, likewise; and whether anything
-    /// was read of the image, which lies at `image` and is `length` bytes long. What has no name counts as far as it was used.
-    pub fn needed(&self, used: &Used, image: u64, length: u64) -> (u64, bool) {
-        let (mut whole, mut nameless, mut reads_image) = (BTreeMap::new(), 0, false);
+    /// What of the flash was used, but for the image, which lies at `image` and is `length` bytes long.
+    pub fn needed(&self, used: &Used, image: u64, length: u64) -> Needed {
+        let (mut functions, mut tables) = (BTreeMap::new(), BTreeMap::new());
+        let mut needed = Needed::default();
         for (start, length) in &used.executed {
             for address in (*start..start + length).step_by(2) {
+                needed.path += 2;
                 match around(&self.functions, address) {
-                    Some((start, size)) => drop(whole.insert(start, size)),
-                    None => nameless += 2,
+                    Some((start, size)) => drop(functions.insert(start, size)),
+                    None => needed.whole += 2,
                 }
             }
         }
@@ -72,16 +73,35 @@ impl Symbols {
         for (start, length) in &used.loaded {
             for address in *start..start + length {
                 if image.contains(&address) {
-                    reads_image = true;
-                } else if let Some((start, size)) = around(&self.functions, address).or(around(&self.constants, address)) {
-                    whole.insert(start, size);
+                    needed.reads_image = true;
+                } else if let Some((start, size)) = around(&self.constants, address) {
+                    tables.insert(start, size);
                 } else {
-                    nameless += 1;
+                    needed.path += 1;
+                    match around(&self.functions, address) {
+                        Some((start, size)) => drop(functions.insert(start, size)),
+                        None => needed.whole += 1,
+                    }
                 }
             }
         }
-        (whole.values().sum::<u64>() + nameless, reads_image)
+        let tables: u64 = tables.values().sum();
+        needed.path += tables;
+        needed.whole += tables + functions.values().sum::<u64>();
+        needed
     }
+}
+
+/// Flash that evaluations used, without the image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Needed {
+    /// Bytes of the functions that ran, each whole, and of the tables that were read, likewise. What has no name counts as far as it was
+    /// used.
+    pub whole: u64,
+    /// Bytes of the instructions that ran and of the tables that were read: a function may also serve other networks.
+    pub path: u64,
+    /// Whether anything was read of the image.
+    pub reads_image: bool,
 }
 
 #[cfg(test)]
@@ -93,7 +113,9 @@ mod tests {
         let symbols = Symbols { functions: [(0x100, 40), (0x200, 8)].into(), constants: [(0x300, 512)].into(), stack_end: 0 };
         let used =
             Used { executed: vec![(0x104, 4), (0x110, 2), (0x400, 6)], loaded: vec![(0x120, 4), (0x310, 2), (0x1000, 99)] };
-        assert_eq!(symbols.needed(&used, 0x0800_1000, 99), (40 + 6 + 512, true));
-        assert_eq!(symbols.needed(&used, 0x0800_2000, 99), (40 + 6 + 512 + 99, false));
+        let needed = symbols.needed(&used, 0x0800_1000, 99);
+        assert_eq!(needed, Needed { whole: 40 + 6 + 512, path: 6 + 6 + 4 + 512, reads_image: true });
+        let needed = symbols.needed(&used, 0x0800_2000, 99);
+        assert_eq!(needed, Needed { whole: 40 + 6 + 512 + 99, path: 6 + 6 + 4 + 512 + 99, reads_image: false });
     }
 }
