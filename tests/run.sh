@@ -28,6 +28,7 @@ install() {
 }
 
 say "tools"
+# cc also builds the cycle model of `cargo mcu`, a plugin of QEMU; it needs no header of QEMU.
 has cc || install "gcc libc6-dev" "macOS: run xcode-select --install"
 has qemu-system-arm || install qemu-system-arm "macOS: run brew install qemu"
 has cargo && has rustc || fail "Rust is missing; install it from https://rustup.rs"
@@ -72,7 +73,7 @@ say "clippy"
 cargo clippy --workspace --all-targets --locked -- -D warnings
 
 say "clippy, microcontroller"
-(cross clippy --package impromptu-firmware --lib --bins --locked --target $target --profile firmware --target-dir target/firmware -- -D warnings)
+(cross clippy --package impromptu-firmware --package impromptu-mcu-benchmark --lib --bins --locked --target $target --profile firmware --target-dir target/firmware -- -D warnings)
 
 say "documentation"
 RUSTDOCFLAGS=-Dwarnings cargo doc --workspace --no-deps --locked

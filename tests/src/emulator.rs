@@ -27,8 +27,9 @@ pub const TOOLCHAIN_VARIABLE: &str = "IMPROMPTU_THUMB_TOOLCHAIN";
 
 /// Variables that would change the build (flags of a coverage or sanitiser run, another target, a wrapper) and with it the
 /// instruction counts, or break it. The model is named by the test alone.
-const FOREIGN_VARIABLES: [&str; 9] = [
+const FOREIGN_VARIABLES: [&str; 10] = [
     "IMPROMPTU_MODEL",
+    "IMPROMPTU_MCU_IMAGES",
     "RUSTFLAGS",
     "CARGO_ENCODED_RUSTFLAGS",
     "CARGO_BUILD_RUSTFLAGS",
@@ -59,11 +60,11 @@ impl Output {
     }
 }
 
-/// Builds the firmware's binary `bin` as it is flashed, with additional variables in its environment, and gives the ELF file.
+/// Builds the binary `bin` of a package as it is flashed, with additional variables in its environment, and gives the ELF file.
 ///
 /// Once for each environment in a run of the tests. Cargo works in a target folder of its own, so that it neither waits for the build
 /// that runs the tests nor disturbs it.
-pub fn build_firmware(bin: &str, environment: &[(&str, &str)]) -> Result<PathBuf> {
+pub fn build_firmware(package: &str, bin: &str, environment: &[(&str, &str)]) -> Result<PathBuf> {
     static BUILT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
     let folder = target_folder();
     let mut variant = DefaultHasher::new();
@@ -71,13 +72,13 @@ pub fn build_firmware(bin: &str, environment: &[(&str, &str)]) -> Result<PathBuf
     let elf = folder.join(format!("{bin}-{:016x}.elf", variant.finish()));
     let mut built = BUILT.lock().unwrap_or_else(PoisonError::into_inner);
     if !built.contains(&elf) {
-        build(bin, environment, &folder, &elf)?;
+        build(package, bin, environment, &folder, &elf)?;
         built.insert(elf.clone());
     }
     Ok(elf)
 }
 
-fn build(bin: &str, environment: &[(&str, &str)], folder: &Path, elf: &Path) -> Result<()> {
+fn build(package: &str, bin: &str, environment: &[(&str, &str)], folder: &Path, elf: &Path) -> Result<()> {
     require_target()?;
     fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
     // Held until the ELF is copied: a build with another environment, in another process, writes to the same name.
@@ -85,7 +86,7 @@ fn build(bin: &str, environment: &[(&str, &str)], folder: &Path, elf: &Path) -> 
     lock.lock()?;
     let built = tool("cargo")
         .current_dir(workspace())
-        .args(["build", "--package", "impromptu-firmware", "--bin", bin])
+        .args(["build", "--package", package, "--bin", bin])
         .args(["--target", TARGET, "--profile", "firmware", "--locked"])
         .arg("--target-dir")
         .arg(folder)
@@ -102,9 +103,15 @@ fn build(bin: &str, environment: &[(&str, &str)], folder: &Path, elf: &Path) -> 
 
 /// Runs `elf` on the emulated board in `working_dir`, where it finds and leaves its files, for at most `timeout`.
 pub fn run(elf: &Path, working_dir: &Path, timeout: Duration) -> Result<Output> {
+    run_with(&[], elf, working_dir, timeout)
+}
+
+/// [`run`] with further arguments for the emulator.
+pub fn run_with(further: &[&str], elf: &Path, working_dir: &Path, timeout: Duration) -> Result<Output> {
     let runner = runner()?;
     let (program, arguments) = runner.split_first().context("the runner is empty")?;
     let mut child = Command::new(program)
+        .args(further)
         .args(arguments)
         .arg(elf)
         .current_dir(working_dir)
@@ -142,6 +149,22 @@ fn drain(pipe: Option<impl Read + Send + 'static>) -> thread::JoinHandle<String>
         }
         String::from_utf8_lossy(&bytes).into_owned()
     })
+}
+
+/// Major and minor version of the emulator.
+pub fn emulator_version() -> Result<(u32, u32)> {
+    let runner = runner()?;
+    let program = runner.first().context("the runner is empty")?;
+    let asked = Command::new(program).arg("--version").output().map_err(|error| match error.kind() {
+        ErrorKind::NotFound => missing_emulator(program),
+        _ => anyhow!(error).context(format!("cannot start {program}")),
+    })?;
+    let text = String::from_utf8_lossy(&asked.stdout);
+    let numbers = text.split_whitespace().find_map(|word| {
+        let mut parts = word.split('.').map_while(|part| part.parse().ok());
+        Some((parts.next()?, parts.next()?))
+    });
+    numbers.with_context(|| format!("{program} --version says no version, but: {text}"))
 }
 
 /// The error for a machine without QEMU.

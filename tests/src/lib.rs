@@ -1,5 +1,7 @@
-//! What the promises need to be tested: the emulated microcontroller, golden texts. The promises themselves are in `tests/`.
+//! What the promises need to be tested: the emulated microcontroller, its cycle model, golden texts. The promises themselves are in
+//! `tests/`.
 
 pub mod board;
 pub mod emulator;
 pub mod golden;
+pub mod mcu;

@@ -2,7 +2,8 @@
 //!
 //! - [`demo`]: what `cargo run --release` shows, threshold by threshold, and that the README tells the same;
 //! - [`board`]: whole flights on the emulated microcontroller, bit by bit, with golden instruction counts;
-//! - [`emulator`]: the emulator is found, fails loudly, and counts repeatably.
+//! - [`emulator`]: the emulator is found, fails loudly, and counts repeatably;
+//! - [`mcu`]: what kernels cost on the microcontroller, beside other engines, with a golden table.
 //!
 //! The parts have tests of their own: plant against an independent simulator and every generator and parser in `host-sim`, model
 //! files bit by bit damaged in `model-export`, kernels and values in `firmware`.
@@ -10,3 +11,4 @@
 mod board;
 mod demo;
 mod emulator;
+mod mcu;

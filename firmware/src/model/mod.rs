@@ -7,11 +7,13 @@ mod blob;
 mod card;
 mod counts;
 pub mod file;
+mod place;
 mod refusal;
 mod validate;
 
 pub use blob::{Blob, Floats, Integers};
 pub use card::*;
+pub use place::Place;
 pub use refusal::Refusal;
 
 use crate::{feedback::Lane, network::Network};

@@ -97,13 +97,5 @@ fn compare(table: &str) {
         "most",
         "mean"
     );
-    let pinned = golden::read(GOLDEN).ok().and_then(|text| text.lines().nth(1).map(str::to_owned));
-    if pinned.is_none_or(|pinned| pinned == format!("compiler: {compiler}")) || golden::updating() {
-        golden::compare(GOLDEN, &text).unwrap();
-    } else {
-        golden::announce(&format!(
-            "NOT COMPARED: the golden instruction counts in tests/golden/{GOLDEN} belong to another compiler than {compiler}. \
-             Counted here:\n{text}"
-        ));
-    }
+    golden::compare_for_compiler(GOLDEN, &compiler, &text).unwrap();
 }
