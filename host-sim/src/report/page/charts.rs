@@ -85,7 +85,10 @@ fn paths(scenes: &[Scene<'_>]) -> anyhow::Result<Markup> {
     let mut panels = Vec::new();
     for scene in scenes.iter().take(PATHS) {
         let first = scene.first();
-        panels.extend(plots::path_in_space(scene)?.map(|svg| figure(&first.trajectory, &circumstances(first), &svg)));
+        panels.extend(
+            plots::path_in_space(scene)?
+                .map(|svg| figure(&short(&first.trajectory), &format!("{}, {}", first.vehicle, circumstances(first)), &svg)),
+        );
     }
     Ok(section(
         "Paths in space",
@@ -114,7 +117,7 @@ fn one_flight(scenes: &[Scene<'_>]) -> anyhow::Result<Markup> {
     Ok(html! {
         section {
             h2 { "One flight in detail" }
-            p { (first.trajectory) ", " (first.vehicle) ", " (first.gains) " gains, " (circumstances(first)) (add_on) "." }
+            p { (short(&first.trajectory)) ", " (first.vehicle) ", " (first.gains) " gains, " (circumstances(first)) (add_on) "." }
             (curves_legend(scenes, true))
             @if !positions.is_empty() {
                 h3 { "Position" }
@@ -133,6 +136,12 @@ fn one_flight(scenes: &[Scene<'_>]) -> anyhow::Result<Markup> {
             }
         }
     })
+}
+
+/// `strokes:SEED:3` is stroke 3: the seed stands at the top of the page.
+fn short(trajectory: &str) -> String {
+    let number = trajectory.strip_prefix("strokes:").and_then(|rest| rest.rsplit(':').next());
+    number.map_or_else(|| trajectory.to_owned(), |number| format!("stroke {number}"))
 }
 
 fn circumstances(trace: &FlightTrace) -> String {
