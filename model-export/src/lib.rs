@@ -4,6 +4,7 @@
 //! `impromptu_firmware::model::Model::from_bytes` accepts; *never* a file that the firmware would refuse: every file is loaded by the
 //! firmware's own code before it is handed out; *source* the format in `impromptu_firmware::model::file`.
 
+pub mod batch;
 pub mod cli;
 pub mod description;
 pub mod encode;
@@ -13,8 +14,10 @@ pub mod inspection;
 pub mod quantise;
 pub mod replacement;
 pub mod rows;
+pub mod stored_network;
 pub mod verify;
 
+pub use batch::Batch;
 pub use description::Description;
 pub use encode::{Precision, encode};
 pub use export_error::ExportError;

@@ -3,13 +3,10 @@
 use std::fmt;
 
 use comfy_table::{Table, presets};
-use impromptu_firmware::{
-    model::{MAX_OUTPUTS, Model},
-    network::Scratch,
-};
+use impromptu_firmware::model::Model;
 use serde::Serialize;
 
-use crate::float_network::FloatNetwork;
+use crate::{batch::Batch, float_network::FloatNetwork};
 
 /// Difference between a float network and a model file over rows of features.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -28,19 +25,21 @@ pub struct Difference {
 pub fn difference(model: &Model<'_>, network: &FloatNetwork, rows: &[Vec<f32>]) -> Difference {
     let zeros = vec![0.0; network.outputs()];
     let mut difference = Difference { rows: rows.len(), rms: zeros.clone(), largest: zeros.clone(), correction_rms: zeros };
-    let mut scratch = Scratch::new();
-    for row in rows {
-        let mut found = [0.0; MAX_OUTPUTS];
-        if let Some(quantised) = model.network() {
-            quantised.evaluate(row, &mut found, &mut scratch);
-        }
-        for (index, (expected, found)) in network.evaluate(row).iter().zip(found).enumerate() {
-            let error = f64::from(*expected) - f64::from(found);
+    let mut found = vec![0.0f32; rows.len() * network.outputs()];
+    if let Some(mut stored) = Batch::of_model(model) {
+        stored.evaluate(rows.iter().map(Vec::as_slice), |row, outputs| {
+            found[row * network.outputs()..][..network.outputs()].copy_from_slice(outputs);
+        });
+    }
+    Batch::of_network(network).evaluate(rows.iter().map(Vec::as_slice), |row, expected| {
+        let found = &found[row * network.outputs()..];
+        for (index, (expected, found)) in expected.iter().zip(found).enumerate() {
+            let error = f64::from(*expected) - f64::from(*found);
             difference.rms[index] += error * error;
             difference.largest[index] = difference.largest[index].max(error.abs());
             difference.correction_rms[index] += f64::from(*expected).powi(2);
         }
-    }
+    });
     let count = rows.len().max(1) as f64;
     difference.rms.iter_mut().chain(&mut difference.correction_rms).for_each(|sum| *sum = (*sum / count).sqrt());
     difference

@@ -20,6 +20,7 @@ use crate::{feedback::Lane, network::Network};
 #[derive(Debug)]
 pub struct Model<'a> {
     card: Card<'a>,
+    blob: Blob<'a>,
     network: Option<Network<'a>>,
     lane: Option<Lane<'a>>,
     envelope: (Floats<'a>, Floats<'a>),
@@ -52,12 +53,17 @@ impl<'a> Model<'a> {
             return Err(Refusal::Value { what: "envelope" });
         }
         validate::probes(&card, &blob, network.as_ref(), lane.as_ref())?;
-        Ok(Self { card, network, lane, envelope, checksum: file::checksum(bytes) })
+        Ok(Self { card, blob, network, lane, envelope, checksum: file::checksum(bytes) })
     }
 
     /// What the model says of itself.
     pub fn card(&self) -> &Card<'a> {
         &self.card
+    }
+
+    /// The bulk numbers to which the card's sections point.
+    pub fn blob(&self) -> &Blob<'a> {
+        &self.blob
     }
 
     /// The network lane's map.

@@ -2,6 +2,7 @@
 
 mod fixture;
 
+mod batch;
 mod command_line;
 mod damage;
 mod description;

@@ -1,0 +1,114 @@
+//! Integer layers over blocks of rows: the firmware's codes, one row of the batch in each vector lane.
+
+use impromptu_firmware::{
+    math::round_to_i32,
+    network::{CODE_LIMIT, requantise, tanh_code},
+};
+use pulp::Arch;
+
+use super::{BLOCK, padded_matrix::PaddedMatrix};
+use crate::{
+    float_network::Activation,
+    stored_network::{Requantisation, StoredIntegerLayer},
+};
+
+/// Rows of the batch in a tile.
+const LANES: usize = 16;
+/// Outputs in a tile.
+const OUTPUTS: usize = 4;
+
+/// Codes of one layer: for each unit those of the batch's rows.
+type Codes = Vec<[i16; BLOCK]>;
+
+/// The layers and the codes between them.
+pub(super) struct IntegerLayers {
+    input_code: f32,
+    layers: Vec<StoredIntegerLayer>,
+    inputs: Codes,
+    outputs: Codes,
+}
+
+impl IntegerLayers {
+    pub(super) fn new(input_code: f32, layers: &[StoredIntegerLayer]) -> Self {
+        Self { input_code, layers: layers.to_vec(), inputs: Vec::new(), outputs: Vec::new() }
+    }
+
+    /// From normalised inputs to normalised outputs, over the first `rows` rows.
+    pub(super) fn forward(&mut self, arch: Arch, rows: usize, inputs: &PaddedMatrix, result: &mut PaddedMatrix) {
+        self.inputs.clear();
+        self.inputs.resize(inputs.columns, [0; BLOCK]);
+        for row in 0..rows {
+            for (codes, value) in self.inputs.iter_mut().zip(inputs.row(row)) {
+                codes[row] = round_to_i32(value * self.input_code, CODE_LIMIT) as i16;
+            }
+        }
+        result.values.fill(0.0);
+        for layer in &self.layers {
+            self.outputs.clear();
+            self.outputs.resize(layer.bias.len(), [0; BLOCK]);
+            for first_row in (0..rows).step_by(LANES) {
+                for first_output in (0..layer.bias.len()).step_by(OUTPUTS) {
+                    let tile = tile(arch, layer, &self.inputs, first_output, first_row);
+                    for (output, sums) in (first_output..layer.bias.len()).zip(&tile) {
+                        match &layer.requantisation {
+                            Requantisation::Codes(multipliers) => {
+                                for (code, sum) in self.outputs[output][first_row..].iter_mut().zip(sums) {
+                                    *code = activated(layer.activation, requantise(*sum, multipliers[output]));
+                                }
+                            }
+                            Requantisation::Floats(scales) => {
+                                for (row, sum) in (first_row..rows).zip(sums) {
+                                    result.row_mut(row)[output] = *sum as f32 * scales[output];
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+            std::mem::swap(&mut self.inputs, &mut self.outputs);
+        }
+    }
+}
+
+fn activated(activation: Activation, code: i16) -> i16 {
+    match activation {
+        Activation::Linear => code,
+        Activation::Relu => code.max(0),
+        Activation::Tanh => tanh_code(code),
+    }
+}
+
+/// Accumulators of `OUTPUTS` outputs (what is beyond the last is zero) and `LANES` rows. Sums of integers that cannot overflow may be
+/// taken in any order.
+fn tile(
+    arch: Arch,
+    layer: &StoredIntegerLayer,
+    inputs: &Codes,
+    first_output: usize,
+    first_row: usize,
+) -> [[i32; LANES]; OUTPUTS] {
+    let width = inputs.len();
+    let weights: [&[i32]; OUTPUTS] = core::array::from_fn(|output| {
+        let start = (first_output + output) * width;
+        layer.weights.get(start..start + width).unwrap_or_default()
+    });
+    let mut sums: [[i32; LANES]; OUTPUTS] =
+        core::array::from_fn(|output| [layer.bias.get(first_output + output).copied().unwrap_or(0); LANES]);
+    arch.dispatch(
+        #[inline(always)]
+        || {
+            let mut sums_here = sums;
+            for (input, codes) in inputs.iter().enumerate() {
+                let codes: &[i16; LANES] = codes[first_row..].first_chunk().expect("blocks are whole tiles");
+                for (sums, weights) in sums_here.iter_mut().zip(weights) {
+                    let weight = weights.get(input).copied().unwrap_or(0);
+                    for (sum, code) in sums.iter_mut().zip(codes) {
+                        *sum = sum.wrapping_add(weight.wrapping_mul(i32::from(*code)));
+                    }
+                }
+            }
+            sums = sums_here;
+        },
+    );
+    sums
+}
