@@ -2,11 +2,13 @@
 //!
 //! - [`demo`]: what `cargo run --release` shows, threshold by threshold, and that the README tells the same;
 //! - [`board`]: whole flights on the emulated microcontroller, bit by bit, with golden instruction counts;
+//! - [`decoder`]: mutated model files are refused or flown, never a panic;
 //! - [`emulator`]: the emulator is found, fails loudly, and counts repeatably.
 //!
 //! The parts have tests of their own: plant against an independent simulator and every generator and parser in `host-sim`, model
 //! files bit by bit damaged in `model-export`, kernels and values in `firmware`.
 
 mod board;
+mod decoder;
 mod demo;
 mod emulator;
