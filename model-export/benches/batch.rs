@@ -105,7 +105,14 @@ fn batch(criterion: &mut Criterion) {
         let mut outputs = [0.0; MAX_OUTPUTS];
         let mut passes: [(&str, Box<dyn FnMut() + '_>); 4] = [
             ("float, one by one", Box::new(|| rows.iter().for_each(|row| drop(black_box(float.evaluate(row)))))),
-            ("float, batch", Box::new(|| float_batch.evaluate(slices(), |_, outputs| drop(black_box(outputs[0]))))),
+            (
+                "float, batch",
+                Box::new(|| {
+                    float_batch.evaluate(slices(), |_, outputs| {
+                        black_box(outputs[0]);
+                    })
+                }),
+            ),
             (
                 "int8, one by one",
                 Box::new(|| {
@@ -115,7 +122,14 @@ fn batch(criterion: &mut Criterion) {
                     }
                 }),
             ),
-            ("int8, batch", Box::new(|| integer_batch.evaluate(slices(), |_, outputs| drop(black_box(outputs[0]))))),
+            (
+                "int8, batch",
+                Box::new(|| {
+                    integer_batch.evaluate(slices(), |_, outputs| {
+                        black_box(outputs[0]);
+                    })
+                }),
+            ),
         ];
         let times = passes.each_mut().map(|(_, pass)| fastest(pass));
         for pair in 0..2 {

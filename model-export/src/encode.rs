@@ -10,10 +10,12 @@ use impromptu_firmware::{
 };
 
 use crate::{
+    bounds::bounds,
     description::{ChannelDescription, Description},
     export_error::ExportError,
     float_network::{Activation, FloatNetwork},
     quantise::{IntegerLayer, quantise},
+    stored_network::StoredNetwork,
 };
 
 /// Number format of the dense layers.
@@ -228,6 +230,7 @@ pub fn encode(
         }
     }
     let mut blob = BlobWriter::default();
+    let float = network;
     let network = network.map(|network| layout(network, precision, calibration, &mut blob)).transpose()?;
     let lane = lane(description, &mut blob)?;
     let minima = description.envelope.iter().map(|(low, _)| *low);
@@ -262,8 +265,12 @@ pub fn encode(
         network,
         lane,
         envelope: blob.floats(minima.chain(maxima)),
+        bounds: Section::default(),
         probes: Probes::default(),
     };
+    if let Some(float) = float {
+        card.bounds = blob.floats(output_bounds(&card, &blob, float, &description.envelope)?);
+    }
     let lane_outputs = card.lane.as_ref().map_or(0, |lane| lane.axes.len());
     // The probes' expected outputs come from the firmware itself, out of a file without probes.
     let bare_lane = Section { offset: 0, length: 0 };
@@ -295,6 +302,17 @@ fn probe_rows(description: &Description, calibration: &[Vec<f32>]) -> Vec<Vec<f3
 fn ticks(field: &'static str, seconds: f32, rate_hz: f32) -> Result<u16, ExportError> {
     let ticks = (seconds * rate_hz).round();
     if (0.0..=f32::from(u16::MAX)).contains(&ticks) { Ok(ticks as u16) } else { Err(ExportError::Time { field, seconds }) }
+}
+
+/// Bounds of the network that the blob holds, output by output.
+fn output_bounds(
+    card: &Card<'_>,
+    blob: &BlobWriter,
+    float: &FloatNetwork,
+    envelope: &[(f32, f32)],
+) -> Result<Vec<f32>, ExportError> {
+    let stored = StoredNetwork::of_card(card, &model::Blob::new(&blob.0)).ok_or(ExportError::Refused(Refusal::Card))?;
+    Ok(bounds(&stored, float, envelope).iter().flat_map(model::OutputBounds::numbers).collect())
 }
 
 /// What the firmware computes for the probes.

@@ -7,7 +7,7 @@ mod text;
 
 use impromptu_firmware::{
     features::{Feature, Relative, Source},
-    model::{Arithmetic, Card, Channel, Interpolation, Margins, Model, Section, file},
+    model::{Arithmetic, Card, Channel, Interpolation, Margins, Model, OutputBounds, Reach, Section, file},
     network::Activation,
 };
 use serde::Serialize;
@@ -103,6 +103,23 @@ pub struct InspectedOutput {
     pub limit: f32,
     /// Largest change in a second, unit/s.
     pub slew_per_second: f32,
+    /// What the network lane can give inside of the training envelope.
+    pub bounds: Option<InspectedBounds>,
+}
+
+/// Proven bounds of an output, in its unit; features within their ranges in training.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct InspectedBounds {
+    /// Smallest correction of the network.
+    pub low: f32,
+    /// Largest.
+    pub high: f32,
+    /// Whether the network reaches the limit: `never`, `possibly` or `always`.
+    pub reaches_limit: &'static str,
+    /// Largest difference from the float network that the file was made from.
+    pub difference: f32,
+    /// Largest change when every input moves by at most its scale.
+    pub lipschitz: f32,
 }
 
 /// Shape and cost of the network lane.
@@ -162,9 +179,16 @@ impl Inspection {
         let features = card.features.iter().zip(low.iter().zip(high.iter()));
         let (card_bytes, blob_bytes) = file::split(bytes).map_or((0, 0), |(card, blob)| (card.len(), blob.len()));
         let rate = timing.reference_rate_hz;
-        let outputs = card.outputs.iter().map(|output| {
+        let bounds = model.bounds().iter().map(Some).chain(std::iter::repeat(None));
+        let outputs = card.outputs.iter().zip(bounds).map(|(output, bounds)| {
             let (name, unit) = channel(&card.signals.reference, output.channel);
-            InspectedOutput { name: name.into(), unit: unit.into(), limit: output.limit, slew_per_second: output.slew * rate }
+            InspectedOutput {
+                name: name.into(),
+                unit: unit.into(),
+                limit: output.limit,
+                slew_per_second: output.slew * rate,
+                bounds: bounds.map(|bounds| inspected_bounds(bounds, output.limit)),
+            }
         });
         Self {
             name: card.name.into(),
@@ -218,6 +242,20 @@ fn inspected_feature(card: &Card<'_>, feature: &Feature, low: f32, high: f32) ->
         Relative::Measured(origin) => format!(" - measured {} now", channel(&signals.measured, origin).0),
     };
     InspectedFeature { quantity: format!("{signal} {name}{origin}"), unit: unit.into(), offset: feature.offset, low, high }
+}
+
+fn inspected_bounds(bounds: OutputBounds, limit: f32) -> InspectedBounds {
+    InspectedBounds {
+        low: bounds.low,
+        high: bounds.high,
+        reaches_limit: match bounds.reach(limit) {
+            Reach::Within => "never",
+            Reach::Partly => "possibly",
+            Reach::Beyond => "always",
+        },
+        difference: bounds.difference,
+        lipschitz: bounds.lipschitz,
+    }
 }
 
 fn network(model: &Model<'_>) -> Option<InspectedNetwork> {

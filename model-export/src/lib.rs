@@ -5,6 +5,7 @@
 //! firmware's own code before it is handed out; *source* the format in `impromptu_firmware::model::file`.
 
 pub mod batch;
+pub mod bounds;
 pub mod cli;
 pub mod description;
 pub mod encode;

@@ -4,7 +4,7 @@
 //! *source* the packed order in `impromptu_firmware::network`.
 
 use impromptu_firmware::{
-    model::{Arithmetic, Blob, LayerLayout, Model, Section},
+    model::{Arithmetic, Blob, Card, LayerLayout, Model, Section},
     network::{self, ROWS},
 };
 
@@ -30,6 +30,8 @@ pub struct StoredIntegerLayer {
     pub requantisation: Requantisation,
     /// Activation.
     pub activation: Activation,
+    /// Largest magnitude of an input's code.
+    pub input_limit: i32,
 }
 
 /// The dense layers.
@@ -115,13 +117,18 @@ fn integer_layer(blob: &Blob<'_>, layout: &LayerLayout, last: bool) -> StoredInt
         bias,
         requantisation,
         activation: activation(layout.activation),
+        input_limit: network::CODE_LIMIT,
     }
 }
 
 impl StoredNetwork {
     /// The network of a loaded model, if it has one.
     pub fn of_model(model: &Model<'_>) -> Option<Self> {
-        let (card, blob) = (model.card(), model.blob());
+        Self::of_card(model.card(), model.blob())
+    }
+
+    /// The same out of the parts of a file that is still being made.
+    pub(crate) fn of_card(card: &Card<'_>, blob: &Blob<'_>) -> Option<Self> {
         let layout = card.network.as_ref()?;
         let (inputs, outputs) = (card.features.len(), card.outputs.len());
         let mut input_mean = floats(blob, layout.input_normalisation, 2 * inputs);

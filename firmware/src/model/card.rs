@@ -255,6 +255,8 @@ pub struct Card<'a> {
     pub lane: Option<LaneLayout>,
     /// f32: smallest, then largest value of each feature in training.
     pub envelope: Section,
+    /// f32: low, high, difference, lipschitz ([`super::OutputBounds`]) of each output; empty without a network.
+    pub bounds: Section,
     /// Probes.
     pub probes: Probes,
 }

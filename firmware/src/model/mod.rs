@@ -4,6 +4,7 @@
 //! any bytes; *source* [`mod@file`] for the layout, [`Card`] for the fields.
 
 mod blob;
+mod bounds;
 mod card;
 mod counts;
 pub mod file;
@@ -11,6 +12,7 @@ mod refusal;
 mod validate;
 
 pub use blob::{Blob, Floats, Integers};
+pub use bounds::{Bounds, OutputBounds, Reach};
 pub use card::*;
 pub use refusal::Refusal;
 
@@ -24,6 +26,7 @@ pub struct Model<'a> {
     network: Option<Network<'a>>,
     lane: Option<Lane<'a>>,
     envelope: (Floats<'a>, Floats<'a>),
+    bounds: Bounds<'a>,
     checksum: u32,
 }
 
@@ -52,8 +55,9 @@ impl<'a> Model<'a> {
         if envelope.0.iter().zip(envelope.1.iter()).any(|(low, high)| low > high) {
             return Err(Refusal::Value { what: "envelope" });
         }
-        validate::probes(&card, &blob, network.as_ref(), lane.as_ref())?;
-        Ok(Self { card, blob, network, lane, envelope, checksum: file::checksum(bytes) })
+        let bounds = Bounds::new(&card, &blob)?;
+        validate::probes(&card, &blob, network.as_ref().map(|network| (network, &envelope, &bounds)), lane.as_ref())?;
+        Ok(Self { card, blob, network, lane, envelope, bounds, checksum: file::checksum(bytes) })
     }
 
     /// What the model says of itself.
@@ -79,6 +83,11 @@ impl<'a> Model<'a> {
     /// Smallest and largest value of each feature in training.
     pub fn envelope(&self) -> (Floats<'a>, Floats<'a>) {
         self.envelope
+    }
+
+    /// What the network can do inside of the envelope.
+    pub fn bounds(&self) -> &Bounds<'a> {
+        &self.bounds
     }
 
     /// CRC-32 that identifies the file.

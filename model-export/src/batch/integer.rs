@@ -4,7 +4,7 @@ use impromptu_firmware::{
     math::round_to_i32,
     network::{CODE_LIMIT, requantise, tanh_code},
 };
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 
 use super::{BLOCK, padded_matrix::PaddedMatrix};
 use crate::{
@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// Rows of the batch in a tile.
-const LANES: usize = 16;
+const LANES: usize = 32;
 /// Outputs in a tile.
 const OUTPUTS: usize = 4;
 
@@ -92,23 +92,32 @@ fn tile(
         let start = (first_output + output) * width;
         layer.weights.get(start..start + width).unwrap_or_default()
     });
-    let mut sums: [[i32; LANES]; OUTPUTS] =
-        core::array::from_fn(|output| [layer.bias.get(first_output + output).copied().unwrap_or(0); LANES]);
-    arch.dispatch(
-        #[inline(always)]
-        || {
-            let mut sums_here = sums;
-            for (input, codes) in inputs.iter().enumerate() {
-                let codes: &[i16; LANES] = codes[first_row..].first_chunk().expect("blocks are whole tiles");
-                for (sums, weights) in sums_here.iter_mut().zip(weights) {
-                    let weight = weights.get(input).copied().unwrap_or(0);
-                    for (sum, code) in sums.iter_mut().zip(codes) {
-                        *sum = sum.wrapping_add(weight.wrapping_mul(i32::from(*code)));
-                    }
+    let bias = core::array::from_fn(|output| layer.bias.get(first_output + output).copied().unwrap_or(0));
+    arch.dispatch(Tile { inputs, weights, bias, first_row })
+}
+
+struct Tile<'a> {
+    inputs: &'a [[i16; BLOCK]],
+    weights: [&'a [i32]; OUTPUTS],
+    bias: [i32; OUTPUTS],
+    first_row: usize,
+}
+
+impl WithSimd for Tile<'_> {
+    type Output = [[i32; LANES]; OUTPUTS];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        let mut sums = self.bias.map(|bias| [bias; LANES]);
+        for (input, codes) in self.inputs.iter().enumerate() {
+            let codes: &[i16; LANES] = codes[self.first_row..].first_chunk().expect("blocks are whole tiles");
+            for (sums, weights) in sums.iter_mut().zip(self.weights) {
+                let weight = weights.get(input).copied().unwrap_or(0);
+                for (sum, code) in sums.iter_mut().zip(codes) {
+                    *sum = sum.wrapping_add(weight.wrapping_mul(i32::from(*code)));
                 }
             }
-            sums = sums_here;
-        },
-    );
-    sums
+        }
+        sums
+    }
 }

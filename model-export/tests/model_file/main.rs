@@ -3,6 +3,7 @@
 mod fixture;
 
 mod batch;
+mod bounds;
 mod command_line;
 mod damage;
 mod description;
