@@ -56,6 +56,8 @@ pub struct OutputComparison {
     pub rms: f64,
     /// Largest difference, in the unit.
     pub largest: f64,
+    /// Largest difference that is possible with features within their ranges in training: the file's bound, in the unit.
+    pub bound: f64,
     /// RMS of the float network's correction, in the unit.
     pub correction_rms: f64,
     /// RMS difference in percent of that; none if there is no correction.
@@ -103,7 +105,7 @@ pub fn compare(model: &Model<'_>, network: &FloatNetwork, rows: &[Vec<f32>]) -> 
         return Err(ComparisonError::Shape { what, expected, found });
     }
     let difference = difference(model, network, rows);
-    let outputs = card.outputs.iter().enumerate().map(|(index, output)| {
+    let outputs = card.outputs.iter().zip(model.bounds().iter()).enumerate().map(|(index, (output, bounds))| {
         let channel = card.signals.reference.get(usize::from(output.channel));
         let (rms, correction_rms) = (difference.rms[index], difference.correction_rms[index]);
         OutputComparison {
@@ -111,6 +113,7 @@ pub fn compare(model: &Model<'_>, network: &FloatNetwork, rows: &[Vec<f32>]) -> 
             unit: channel.map_or("", |channel| channel.unit).into(),
             rms,
             largest: difference.largest[index],
+            bound: bounds.difference.into(),
             correction_rms,
             rms_percent: (correction_rms > 0.0).then(|| 100.0 * rms / correction_rms),
         }
@@ -121,7 +124,15 @@ pub fn compare(model: &Model<'_>, network: &FloatNetwork, rows: &[Vec<f32>]) -> 
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut table = Table::new();
-        table.load_style(presets::NOTHING).set_header(["output", "unit", "correction RMS", "difference RMS", "largest", "RMS %"]);
+        table.load_style(presets::NOTHING).set_header([
+            "output",
+            "unit",
+            "correction RMS",
+            "difference RMS",
+            "largest",
+            "bound",
+            "RMS %",
+        ]);
         for output in &self.outputs {
             table.add_row([
                 output.name.clone(),
@@ -129,6 +140,7 @@ impl fmt::Display for Comparison {
                 format!("{:.4e}", output.correction_rms),
                 format!("{:.3e}", output.rms),
                 format!("{:.3e}", output.largest),
+                format!("{:.3e}", output.bound),
                 output.rms_percent.map_or("-".into(), |percent| format!("{percent:.4}")),
             ]);
         }

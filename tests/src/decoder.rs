@@ -16,7 +16,7 @@ const EXTREMES: [f32; 8] = [0.0, 1.0, -3.4e38, 3.4e38, 1e-40, f32::INFINITY, f32
 /// Samples that the adapter's preview holds here.
 const PREVIEW: usize = 256;
 
-/// Loads the bytes as they are, then with a header that fits, then with probes and bounds that fit too; flies whatever loads.
+/// Loads the bytes as they are, then with a header that fits, then with probes that fit too; flies whatever loads.
 pub fn survive(bytes: &[u8]) -> bool {
     let raw = load(bytes);
     let repaired = with_header(bytes);

@@ -19,7 +19,7 @@ mod relaxation;
 
 use impromptu_firmware::model::OutputBounds;
 
-use self::layered::Layered;
+use self::{difference::Pair, layered::Layered};
 use crate::{float_network::FloatNetwork, stored_network::StoredNetwork};
 
 /// Relative margin for the rounding of the computations here: n · 2⁻⁵³ for sums of up to 1,500 terms is 2e-13.
@@ -69,7 +69,7 @@ pub fn bounds(stored: &StoredNetwork, float: &FloatNetwork, envelope: &[(f32, f3
     let rounding: Vec<f64> =
         first.inputs.iter().zip(&second.inputs).map(|(f, q)| 2.5e-7 * f.hull(*q).magnitude() + 1e-36).collect();
     let ranges = second.output_range(&second_known);
-    let differences = difference::differences((&first, &first_known), (&second, &second_known), &rounding);
+    let differences = Pair::new((&first, &first_known), (&second, &second_known), &rounding).outputs();
     let slopes = difference::slopes(&first, &first_known);
     ranges
         .into_iter()

@@ -155,14 +155,19 @@ impl Layered {
         ends.collect()
     }
 
-    /// Rounding of an output behind its dense layers, before it is denormalised.
-    pub(super) fn result_rounding(&self, known: &[Known], output: usize) -> f64 {
+    /// Largest sum of the magnitudes of an output's dense layers and skip.
+    pub(super) fn result_magnitude(&self, known: &[Known], output: usize) -> f64 {
         let dense = known.last().map_or(0.0, |last| last.sums[output].magnitude());
         let straight = self.skip.as_ref().map_or(0.0, |skip| {
             let row = &skip[output * self.inputs.len()..][..self.inputs.len()];
             row.iter().zip(&self.inputs).map(|(weight, input)| weight.abs() * input.magnitude()).sum()
         });
-        (self.relative + MARGIN) * (dense + straight) + 1e-36
+        dense + straight
+    }
+
+    /// Rounding of an output behind its dense layers, before it is denormalised.
+    pub(super) fn result_rounding(&self, known: &[Known], output: usize) -> f64 {
+        (self.relative + MARGIN) * self.result_magnitude(known, output) + 1e-36
     }
 
     fn denormalised(&self, output: usize, range: Interval) -> Interval {

@@ -181,9 +181,9 @@ fn steepest(float: &FloatNetwork, points: &[Vec<f32>], output: usize) -> f64 {
 #[test]
 fn bounds_are_near_what_sampling_finds() {
     for (name, hidden, width, most) in [
-        ("20-32x2-2 relu, narrow box", vec![(32, Relu); 2], 0.2, [2.5, 12.0, 2.5]),
-        ("20-32x2-2 tanh", vec![(32, Tanh); 2], 1.0, [6.0, 300.0, 60.0]),
-        ("20-32x2-2 relu", vec![(32, Relu); 2], 4.0, [12.0, 300.0, 60.0]),
+        ("20-32x2-2 relu, narrow box", vec![(32, Relu); 2], 0.2, [2.5, 16.0, 8.0]),
+        ("20-32x2-2 tanh", vec![(32, Tanh); 2], 1.0, [3.0, 35.0, 12.0]),
+        ("20-32x2-2 relu", vec![(32, Relu); 2], 4.0, [4.5, 300.0, 15.0]),
     ] {
         let mut numbers = Numbers(4);
         let float = network(&mut numbers, 20, &hidden, 2, true);
