@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Mutated files in the test.
-const FILES: u32 = 60_000;
+const FILES: u32 = 250_000;
 
 /// The golden models.
 fn seeds() -> Vec<Vec<u8>> {
