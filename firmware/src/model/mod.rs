@@ -10,7 +10,7 @@ pub mod file;
 mod refusal;
 mod validate;
 
-pub use blob::{Blob, Floats, Integers};
+pub use blob::{Blob, Floats, Words};
 pub use card::*;
 pub use refusal::Refusal;
 

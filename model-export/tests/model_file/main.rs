@@ -7,6 +7,7 @@ mod damage;
 mod description;
 mod golden;
 mod refusals;
+mod precision;
 mod round_trip;
 
 mod adapter;
