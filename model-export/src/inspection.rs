@@ -125,7 +125,7 @@ pub struct InspectedBounds {
 /// Shape and cost of the network lane.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct InspectedNetwork {
-    /// `float` or `int8`.
+    /// `float`, `int8` or `int16`.
     pub arithmetic: &'static str,
     /// Inputs.
     pub inputs: usize,
@@ -260,12 +260,13 @@ fn inspected_bounds(bounds: OutputBounds, limit: f32) -> InspectedBounds {
 
 fn network(model: &Model<'_>) -> Option<InspectedNetwork> {
     let layout = model.card().network.as_ref()?;
-    let layers = layout.layers.iter().flat_map(|layer| [layer.weights, layer.bias, layer.requantisation]);
+    let layers = layout.layers.iter().map(|layer| layer.rows);
     let sections = layers.chain([layout.input_normalisation, layout.skip, layout.output_normalisation]);
     Some(InspectedNetwork {
         arithmetic: match layout.arithmetic {
             Arithmetic::Float => "float",
             Arithmetic::Int8 => "int8",
+            Arithmetic::Int16 => "int16",
         },
         inputs: model.card().features.len(),
         layers: layout.layers.iter().map(|layer| (layer.outputs, layer.activation)).collect(),

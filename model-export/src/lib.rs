@@ -12,6 +12,7 @@ pub mod encode;
 pub mod export_error;
 pub mod float_network;
 pub mod inspection;
+pub mod packing;
 pub mod quantise;
 pub mod replacement;
 pub mod rows;

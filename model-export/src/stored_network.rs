@@ -1,11 +1,14 @@
 //! The network of a model file as the firmware computes with it, its matrices unpacked.
 //!
 //! *in* a loaded model; *out* plain vectors for batches and bounds; *never* a number that the firmware does not use;
-//! *source* the packed order in `impromptu_firmware::network`.
+//! *source* the packed orders in `impromptu_firmware::network::kernel`.
 
 use impromptu_firmware::{
     model::{Arithmetic, Blob, Card, LayerLayout, Model, Section},
-    network::{self, ROWS},
+    network::{
+        self, ROWS,
+        kernel::{Width, portable},
+    },
 };
 
 use crate::float_network::{Activation, DenseLayer};
@@ -22,7 +25,7 @@ pub enum Requantisation {
 /// One integer layer: accumulator = Σ weight × code + bias.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StoredIntegerLayer {
-    /// Row-major `[outputs][inputs]`.
+    /// Effective ones, row-major `[outputs][inputs]`.
     pub weights: Vec<i32>,
     /// One for each output.
     pub bias: Vec<i32>,
@@ -31,7 +34,7 @@ pub struct StoredIntegerLayer {
     /// Activation.
     pub activation: Activation,
     /// Largest magnitude of an input's code.
-    pub input_limit: i32,
+    pub input_limit: u16,
 }
 
 /// The dense layers.
@@ -57,8 +60,8 @@ pub struct StoredNetwork {
     pub input_reciprocal: Vec<f32>,
     /// Dense layers.
     pub layers: StoredLayers,
-    /// Row-major `[outputs][inputs]`.
-    pub skip: Option<Vec<f32>>,
+    /// From normalised inputs to normalised outputs; its bias is usually zero.
+    pub skip: Option<DenseLayer>,
     /// Factor on each output.
     pub output_scale: Vec<f32>,
     /// Added to each output then.
@@ -73,51 +76,54 @@ fn activation(activation: network::Activation) -> Activation {
     }
 }
 
-/// Packed `[block][input][row in block]` to row-major `[outputs][inputs]`.
-fn unpacked<T: Copy>(packed: &[T], inputs: usize, outputs: usize) -> Vec<T> {
-    let at = |output: usize, input: usize| packed[(output / ROWS * inputs + input) * ROWS + output % ROWS];
+/// A section that the model's check has seen.
+fn words(blob: &Blob<'_>, section: Section) -> Vec<u32> {
+    let words = blob.words(section, section.length as usize / 4, "").map(|words| words.all()).unwrap_or_default();
+    words.iter().map(|word| u32::from_le_bytes(*word)).collect()
+}
+
+/// `[outputs][inputs]` of a function of output and input.
+fn matrix<T>(outputs: usize, inputs: usize, at: impl Fn(usize, usize) -> T) -> Vec<T> {
     (0..outputs * inputs).map(|index| at(index / inputs, index % inputs)).collect()
 }
 
-/// A section that the model's check has seen.
-fn floats(blob: &Blob<'_>, section: Section, count: usize) -> Vec<f32> {
-    blob.floats(section, count, "").map(|floats| floats.iter().collect()).unwrap_or_default()
+fn float_layer(blob: &Blob<'_>, section: Section, [inputs, outputs]: [usize; 2], activation: Activation) -> DenseLayer {
+    let words = words(blob, section);
+    // Biases, then the weights of each input, for every block of rows.
+    let block = words.len() / network::padded(outputs).div_ceil(ROWS).max(1);
+    let at = |output: usize, place: usize| f32::from_bits(words[output / ROWS * block + ROWS * place + output % ROWS]);
+    DenseLayer {
+        weights: matrix(outputs, inputs, |output, input| at(output, 1 + input)),
+        bias: (0..outputs).map(|output| at(output, 0)).collect(),
+        activation,
+    }
 }
 
-fn integers(blob: &Blob<'_>, section: Section, count: usize) -> Vec<i32> {
-    blob.integers(section, count, "").map(|integers| integers.iter().collect()).unwrap_or_default()
-}
-
-fn float_layer(blob: &Blob<'_>, layout: &LayerLayout) -> DenseLayer {
+fn integer_layer(blob: &Blob<'_>, width: Width, layout: &LayerLayout, last: bool) -> StoredIntegerLayer {
     let (inputs, outputs) = (usize::from(layout.inputs), usize::from(layout.outputs));
-    let rows = network::padded(outputs);
-    let mut bias = floats(blob, layout.bias, rows);
-    bias.truncate(outputs);
-    let weights = unpacked(&floats(blob, layout.weights, inputs * rows), inputs, outputs);
-    DenseLayer { weights, bias, activation: activation(layout.activation) }
-}
-
-fn integer_layer(blob: &Blob<'_>, layout: &LayerLayout, last: bool) -> StoredIntegerLayer {
-    let (inputs, outputs) = (usize::from(layout.inputs), usize::from(layout.outputs));
-    let rows = network::padded(outputs);
-    let bytes = blob.bytes(layout.weights, inputs * rows, "").unwrap_or_default();
-    let mut bias = integers(blob, layout.bias, rows);
-    bias.truncate(outputs);
-    let requantisation = if last {
-        let mut scales = floats(blob, layout.requantisation, rows);
-        scales.truncate(outputs);
-        Requantisation::Floats(scales)
-    } else {
-        let mut multipliers = integers(blob, layout.requantisation, rows);
-        multipliers.truncate(outputs);
-        Requantisation::Codes(multipliers)
+    let words = words(blob, layout.rows);
+    let pairs = inputs.next_multiple_of(network::INPUT_PADDING) / 2;
+    let block = width.block(pairs);
+    let weight = |output: usize, input: usize| {
+        let row = output % ROWS;
+        let first = output / ROWS * block + ROWS + input / 2 * width.words();
+        let halves = match width {
+            Width::Int8 => portable::byte_rows(words[first + row / 2])[row % 2],
+            Width::Int16 => portable::halves(words[first + row]),
+        };
+        i32::from(halves[input % 2])
     };
+    let behind = |output: usize| words[(output / ROWS + 1) * block - ROWS + output % ROWS];
     StoredIntegerLayer {
-        weights: unpacked(bytes, inputs, outputs).into_iter().map(|byte| i32::from(byte as i8)).collect(),
-        bias,
-        requantisation,
+        weights: matrix(outputs, inputs, weight),
+        bias: (0..outputs).map(|output| words[output / ROWS * block + output % ROWS] as i32).collect(),
+        requantisation: if last {
+            Requantisation::Floats((0..outputs).map(|output| f32::from_bits(behind(output))).collect())
+        } else {
+            Requantisation::Codes((0..outputs).map(|output| behind(output) as i32).collect())
+        },
         activation: activation(layout.activation),
-        input_limit: network::CODE_LIMIT,
+        input_limit: layout.input_limit,
     }
 }
 
@@ -131,24 +137,28 @@ impl StoredNetwork {
     pub(crate) fn of_card(card: &Card<'_>, blob: &Blob<'_>) -> Option<Self> {
         let layout = card.network.as_ref()?;
         let (inputs, outputs) = (card.features.len(), card.outputs.len());
-        let mut input_mean = floats(blob, layout.input_normalisation, 2 * inputs);
+        let floats = |section: Section| words(blob, section).into_iter().map(f32::from_bits).collect::<Vec<f32>>();
+        let mut input_mean = floats(layout.input_normalisation);
         let input_reciprocal = input_mean.split_off(inputs);
-        let mut output_scale = floats(blob, layout.output_normalisation, 2 * outputs);
+        let mut output_scale = floats(layout.output_normalisation);
         let output_mean = output_scale.split_off(outputs);
-        let layers = match layout.arithmetic {
-            Arithmetic::Float => StoredLayers::Float(layout.layers.iter().map(|layer| float_layer(blob, layer)).collect()),
-            Arithmetic::Int8 => StoredLayers::Integer {
-                input_code: layout.input_code,
-                layers: layout
-                    .layers
-                    .iter()
-                    .enumerate()
-                    .map(|(index, layer)| integer_layer(blob, layer, index + 1 == layout.layers.len()))
-                    .collect(),
-            },
+        let float = |layer: &LayerLayout| {
+            let shape = [usize::from(layer.inputs), usize::from(layer.outputs)];
+            float_layer(blob, layer.rows, shape, activation(layer.activation))
         };
-        let skip = (layout.skip.length > 0)
-            .then(|| unpacked(&floats(blob, layout.skip, inputs * network::padded(outputs)), inputs, outputs));
+        let integer = |width| StoredLayers::Integer {
+            input_code: layout.input_code,
+            layers: (1..)
+                .zip(&layout.layers)
+                .map(|(n, layer)| integer_layer(blob, width, layer, n == layout.layers.len()))
+                .collect(),
+        };
+        let layers = match layout.arithmetic {
+            Arithmetic::Float => StoredLayers::Float(layout.layers.iter().map(float).collect()),
+            Arithmetic::Int8 => integer(Width::Int8),
+            Arithmetic::Int16 => integer(Width::Int16),
+        };
+        let skip = (layout.skip.length > 0).then(|| float_layer(blob, layout.skip, [inputs, outputs], Activation::Linear));
         Some(Self { input_mean, input_reciprocal, layers, skip, output_scale, output_mean })
     }
 }

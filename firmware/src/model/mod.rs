@@ -11,7 +11,7 @@ pub mod file;
 mod refusal;
 mod validate;
 
-pub use blob::{Blob, Floats, Integers};
+pub use blob::{Blob, Floats, Words};
 pub use bounds::{Bounds, OutputBounds, Reach};
 pub use card::*;
 pub use refusal::Refusal;

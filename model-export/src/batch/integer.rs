@@ -1,9 +1,6 @@
 //! Integer layers over blocks of rows: the firmware's codes, one row of the batch in each vector lane.
 
-use impromptu_firmware::{
-    math::round_to_i32,
-    network::{CODE_LIMIT, requantise, tanh_code},
-};
+use impromptu_firmware::network::{requantise, tanh_code};
 use pulp::{Arch, Simd, WithSimd};
 
 use super::{BLOCK, padded_matrix::PaddedMatrix};
@@ -26,24 +23,38 @@ pub(super) struct IntegerLayers {
     layers: Vec<StoredIntegerLayer>,
     inputs: Codes,
     outputs: Codes,
+    result: PaddedMatrix,
 }
 
 impl IntegerLayers {
     pub(super) fn new(input_code: f32, layers: &[StoredIntegerLayer]) -> Self {
-        Self { input_code, layers: layers.to_vec(), inputs: Vec::new(), outputs: Vec::new() }
+        let outputs = layers.last().map_or(0, |last| last.bias.len());
+        Self {
+            input_code,
+            layers: layers.to_vec(),
+            inputs: Vec::new(),
+            outputs: Vec::new(),
+            result: PaddedMatrix::zeros(BLOCK, outputs),
+        }
+    }
+
+    /// Normalised outputs, if there is a layer.
+    pub(super) fn result(&self) -> Option<&PaddedMatrix> {
+        self.layers.last().map(|_| &self.result)
     }
 
     /// From normalised inputs to normalised outputs, over the first `rows` rows.
-    pub(super) fn forward(&mut self, arch: Arch, rows: usize, inputs: &PaddedMatrix, result: &mut PaddedMatrix) {
+    pub(super) fn forward(&mut self, arch: Arch, rows: usize, inputs: &PaddedMatrix) {
         self.inputs.clear();
         self.inputs.resize(inputs.columns, [0; BLOCK]);
+        let limit = self.layers.first().map_or(0.0, |layer| f32::from(layer.input_limit));
         for row in 0..rows {
             for (codes, value) in self.inputs.iter_mut().zip(inputs.row(row)) {
-                codes[row] = round_to_i32(value * self.input_code, CODE_LIMIT) as i16;
+                codes[row] = (value * self.input_code).round_ties_even().clamp(-limit, limit) as i16;
             }
         }
-        result.values.fill(0.0);
-        for layer in &self.layers {
+        for (index, layer) in self.layers.iter().enumerate() {
+            let limit = self.layers.get(index + 1).map_or(0, |next| next.input_limit);
             self.outputs.clear();
             self.outputs.resize(layer.bias.len(), [0; BLOCK]);
             for first_row in (0..rows).step_by(LANES) {
@@ -53,12 +64,12 @@ impl IntegerLayers {
                         match &layer.requantisation {
                             Requantisation::Codes(multipliers) => {
                                 for (code, sum) in self.outputs[output][first_row..].iter_mut().zip(sums) {
-                                    *code = activated(layer.activation, requantise(*sum, multipliers[output]));
+                                    *code = activated(layer.activation, requantise(*sum, multipliers[output]), limit);
                                 }
                             }
                             Requantisation::Floats(scales) => {
                                 for (row, sum) in (first_row..rows).zip(sums) {
-                                    result.row_mut(row)[output] = *sum as f32 * scales[output];
+                                    self.result.row_mut(row)[output] = *sum as f32 * scales[output];
                                 }
                             }
                         }
@@ -70,11 +81,13 @@ impl IntegerLayers {
     }
 }
 
-fn activated(activation: Activation, code: i16) -> i16 {
+#[inline(always)]
+fn activated(activation: Activation, code: i32, limit: u16) -> i16 {
+    let most = i32::from(limit);
     match activation {
-        Activation::Linear => code,
-        Activation::Relu => code.max(0),
-        Activation::Tanh => tanh_code(code),
+        Activation::Linear => code.clamp(-most, most) as i16,
+        Activation::Relu => code.clamp(0, most) as i16,
+        Activation::Tanh => tanh_code(code.clamp(i16::MIN.into(), i16::MAX.into()) as i16, limit),
     }
 }
 

@@ -8,7 +8,7 @@ mod integer;
 pub mod matrix_kernel;
 pub mod padded_matrix;
 
-use impromptu_firmware::model::Model;
+use impromptu_firmware::{model::Model, network};
 use pulp::Arch;
 
 use self::{
@@ -29,20 +29,26 @@ fn transposed(weights: &[f32], inputs: usize, outputs: usize) -> PaddedMatrix {
     PaddedMatrix::from_fn(inputs, outputs, |input, output| weights[output * inputs + input])
 }
 
+fn one_row(values: &[f32]) -> PaddedMatrix {
+    PaddedMatrix::from_fn(1, values.len(), |_, column| values[column])
+}
+
 struct Layer {
     weights: PaddedMatrix,
     /// Padded as a row of the outputs.
     bias: PaddedMatrix,
     activation: Activation,
+    tanh: fn(f32) -> f32,
     outputs: PaddedMatrix,
 }
 
 impl Layer {
-    fn new(layer: &DenseLayer, inputs: usize) -> Self {
+    fn new(layer: &DenseLayer, inputs: usize, tanh: fn(f32) -> f32) -> Self {
         Self {
             weights: transposed(&layer.weights, inputs, layer.outputs()),
-            bias: PaddedMatrix::from_fn(1, layer.outputs(), |_, output| layer.bias[output]),
+            bias: one_row(&layer.bias),
             activation: layer.activation,
+            tanh,
             outputs: PaddedMatrix::zeros(BLOCK, layer.outputs()),
         }
     }
@@ -56,7 +62,7 @@ impl Layer {
         product::<false>(arch, shape, inputs, &self.weights, &mut self.outputs, Unfused(Bias::<false>(bias)));
         if self.activation == Activation::Tanh {
             for row in 0..rows {
-                self.outputs.row_mut(row).iter_mut().for_each(|value| *value = self.activation.apply(*value));
+                self.outputs.row_mut(row).iter_mut().for_each(|value| *value = (self.tanh)(*value));
             }
         }
     }
@@ -67,21 +73,25 @@ enum Layers {
     Integer(IntegerLayers),
 }
 
-/// How the inputs are normalised: both ways round differently.
-enum Normalisation {
-    Divide,
-    Multiply,
+/// In whose order the operations are: both round differently.
+#[derive(Clone, Copy, PartialEq)]
+enum Order {
+    /// [`FloatNetwork::evaluate`]: the input is divided by its scale, the skip's products are added to the dense layers' outputs.
+    FloatNetwork,
+    /// The firmware: the input is multiplied by the reciprocal, the dense layers' outputs are added to the skip's.
+    Firmware,
 }
 
 /// A network laid out for batches.
 pub struct Batch {
     arch: Arch,
-    normalisation: Normalisation,
+    order: Order,
     input_mean: Vec<f32>,
     /// Divisors or factors.
     input_scale: Vec<f32>,
     layers: Layers,
-    skip: Option<PaddedMatrix>,
+    /// Weights and bias.
+    skip: Option<(PaddedMatrix, PaddedMatrix)>,
     output_scale: Vec<f32>,
     output_mean: Vec<f32>,
     inputs: PaddedMatrix,
@@ -93,11 +103,14 @@ impl Batch {
     pub fn of_network(network: &FloatNetwork) -> Self {
         Self {
             arch: Arch::new(),
-            normalisation: Normalisation::Divide,
+            order: Order::FloatNetwork,
             input_mean: network.input_mean.clone(),
             input_scale: network.input_scale.clone(),
-            layers: Layers::Float(float_layers(&network.layers, network.inputs())),
-            skip: network.skip.as_ref().map(|skip| transposed(skip, network.inputs(), network.outputs())),
+            layers: Layers::Float(float_layers(&network.layers, network.inputs(), libm::tanhf)),
+            skip: network
+                .skip
+                .as_ref()
+                .map(|skip| (transposed(skip, network.inputs(), network.outputs()), PaddedMatrix::zeros(1, network.outputs()))),
             output_scale: network.output_scale.clone(),
             output_mean: network.output_mean.clone(),
             inputs: PaddedMatrix::zeros(BLOCK, network.inputs()),
@@ -107,20 +120,20 @@ impl Batch {
 
     /// The network of a loaded model, if it has one.
     pub fn of_model(model: &Model<'_>) -> Option<Self> {
-        let network = StoredNetwork::of_model(model)?;
-        let (inputs, outputs) = (network.input_mean.len(), network.output_mean.len());
+        let stored = StoredNetwork::of_model(model)?;
+        let (inputs, outputs) = (stored.input_mean.len(), stored.output_mean.len());
         Some(Self {
             arch: Arch::new(),
-            normalisation: Normalisation::Multiply,
-            layers: match &network.layers {
-                StoredLayers::Float(layers) => Layers::Float(float_layers(layers, inputs)),
+            order: Order::Firmware,
+            layers: match &stored.layers {
+                StoredLayers::Float(layers) => Layers::Float(float_layers(layers, inputs, network::tanh)),
                 StoredLayers::Integer { input_code, layers } => Layers::Integer(IntegerLayers::new(*input_code, layers)),
             },
-            input_mean: network.input_mean,
-            input_scale: network.input_reciprocal,
-            skip: network.skip.map(|skip| transposed(&skip, inputs, outputs)),
-            output_scale: network.output_scale,
-            output_mean: network.output_mean,
+            input_mean: stored.input_mean,
+            input_scale: stored.input_reciprocal,
+            skip: stored.skip.map(|skip| (transposed(&skip.weights, inputs, outputs), one_row(&skip.bias))),
+            output_scale: stored.output_scale,
+            output_mean: stored.output_mean,
             inputs: PaddedMatrix::zeros(BLOCK, inputs),
             result: PaddedMatrix::zeros(BLOCK, outputs),
         })
@@ -175,9 +188,9 @@ impl Batch {
     fn load(&mut self, slot: usize, row: &[f32]) {
         let normalisation = self.input_mean.iter().zip(&self.input_scale);
         for ((value, input), (mean, scale)) in self.inputs.row_mut(slot).iter_mut().zip(row).zip(normalisation) {
-            *value = match self.normalisation {
-                Normalisation::Divide => (input - mean) / scale,
-                Normalisation::Multiply => (input - mean) * scale,
+            *value = match self.order {
+                Order::FloatNetwork => (input - mean) / scale,
+                Order::Firmware => (input - mean) * scale,
             };
         }
     }
@@ -191,21 +204,33 @@ impl Batch {
                     from_here[0].forward(self.arch, rows, inputs);
                 }
             }
-            Layers::Integer(layers) => layers.forward(self.arch, rows, &self.inputs, &mut self.result),
+            Layers::Integer(layers) => layers.forward(self.arch, rows, &self.inputs),
         }
     }
 
     /// Skip and denormalisation.
     fn finish(&mut self, rows: usize) {
-        if let Layers::Float(layers) = &self.layers {
-            match layers.last() {
-                Some(last) => (0..rows).for_each(|row| self.result.copy_row(row, &last.outputs, row)),
-                None => self.result.values.fill(0.0),
+        let dense = match &self.layers {
+            Layers::Float(layers) => layers.last().map(|last| &last.outputs),
+            Layers::Integer(layers) => layers.result(),
+        };
+        let copied = self.order == Order::FloatNetwork && dense.is_some();
+        match dense.filter(|_| copied) {
+            Some(dense) => (0..rows).for_each(|row| self.result.copy_row(row, dense, row)),
+            None => self.result.values.fill(0.0),
+        }
+        if let Some((skip, bias)) = &self.skip {
+            let shape = (rows, skip.rows);
+            if copied {
+                product::<false>(self.arch, shape, &self.inputs, skip, &mut self.result, Unfused(Accumulate));
+            } else {
+                product::<false>(self.arch, shape, &self.inputs, skip, &mut self.result, Unfused(Bias::<false>(&bias.values)));
             }
         }
-        if let Some(skip) = &self.skip {
-            let shape = (rows, skip.rows);
-            product::<false>(self.arch, shape, &self.inputs, skip, &mut self.result, Unfused(Accumulate));
+        if let Some(dense) = dense.filter(|_| !copied) {
+            for row in 0..rows {
+                self.result.row_mut(row).iter_mut().zip(dense.row(row)).for_each(|(sum, value)| *sum += value);
+            }
         }
         for row in 0..rows {
             let denormalisation = self.output_scale.iter().zip(&self.output_mean);
@@ -216,10 +241,10 @@ impl Batch {
     }
 }
 
-fn float_layers(layers: &[DenseLayer], inputs: usize) -> Vec<Layer> {
+fn float_layers(layers: &[DenseLayer], inputs: usize, tanh: fn(f32) -> f32) -> Vec<Layer> {
     let mut width = inputs;
     let layers = layers.iter().map(|layer| {
-        let laid_out = Layer::new(layer, width);
+        let laid_out = Layer::new(layer, width, tanh);
         width = layer.outputs();
         laid_out
     });

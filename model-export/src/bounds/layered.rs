@@ -10,7 +10,7 @@
 //! of which the stored arithmetic is one member for every choice of its roundings; *never* one that it is not; *source* the standard
 //! error analysis of sums (Higham, *Accuracy and Stability of Numerical Algorithms*, section 3.1).
 
-use impromptu_firmware::network::{TANH_INPUT_ONE, tanh_code};
+use impromptu_firmware::network::{TANH_ERROR, TANH_INPUT_ONE, tanh_code};
 
 use super::Interval;
 use crate::{
@@ -22,8 +22,10 @@ use crate::{
 const ROUNDING: f64 = 1.0 / 16_777_216.0;
 /// What f32 loses below its smallest normal number, with a wide margin.
 const UNDERFLOW: f64 = 1e-36;
-/// Largest error of tanh in f32, libm's and the firmware's, with a margin.
-const TANH_ERROR: f64 = 4e-7;
+/// Error of tanh in f32 with a margin: libm's is one unit in the last place of a number below 1.
+const LIBM_TANH_ERROR: f64 = 1.3e-7;
+/// The firmware's is found by search, not proven: twice as much.
+const FIRMWARE_TANH_ERROR: f64 = 2.0 * TANH_ERROR;
 /// tanh of an integer network saturates at ±8: 1 - tanh 8 is less.
 const TANH_END: f64 = 2.4e-7;
 
@@ -53,7 +55,7 @@ pub(super) struct Dense {
 }
 
 impl Dense {
-    fn float(layer: &DenseLayer, inputs: usize) -> Self {
+    fn float(layer: &DenseLayer, inputs: usize, tanh_error: f64) -> Self {
         Self {
             inputs,
             weights: layer.weights.iter().map(|weight| f64::from(*weight)).collect(),
@@ -62,7 +64,7 @@ impl Dense {
             relative: sum_rounding(inputs),
             activation: layer.activation,
             clip: f64::INFINITY,
-            activation_error: if layer.activation == Activation::Tanh { TANH_ERROR } else { 0.0 },
+            activation_error: if layer.activation == Activation::Tanh { tanh_error } else { 0.0 },
         }
     }
 
@@ -108,7 +110,7 @@ impl Layered {
         Self {
             inputs: normalised(envelope, |index, value| (value - network.input_mean[index]) / network.input_scale[index]),
             input_error: vec![0.0; inputs],
-            layers: float_layers(&network.layers, inputs),
+            layers: float_layers(&network.layers, inputs, LIBM_TANH_ERROR),
             skip: network.skip.as_deref().map(wide),
             scale: wide(&network.output_scale),
             mean: wide(&network.output_mean),
@@ -122,7 +124,7 @@ impl Layered {
         let inputs = normalised(envelope, |index, value| (value - stored.input_mean[index]) * stored.input_reciprocal[index]);
         let mut input_error = vec![0.0; inputs.len()];
         let layers = match &stored.layers {
-            StoredLayers::Float(layers) => float_layers(layers, inputs.len()),
+            StoredLayers::Float(layers) => float_layers(layers, inputs.len(), FIRMWARE_TANH_ERROR),
             StoredLayers::Integer { input_code, layers } => {
                 let unit = 1.0 / f64::from(*input_code);
                 let limit = layers.first().map_or(0.0, |layer| f64::from(layer.input_limit)) * unit;
@@ -138,17 +140,25 @@ impl Layered {
             inputs,
             input_error,
             layers,
-            skip: stored.skip.as_deref().map(wide),
+            skip: stored.skip.as_ref().map(|skip| wide(&skip.weights)),
             scale: wide(&stored.output_scale),
-            mean: wide(&stored.output_mean),
+            mean: stored
+                .output_mean
+                .iter()
+                .enumerate()
+                .map(|(output, mean)| {
+                    let bias = stored.skip.as_ref().map_or(0.0, |skip| skip.bias[output]);
+                    f64::from(*mean) + f64::from(bias) * f64::from(stored.output_scale[output])
+                })
+                .collect(),
         }
     }
 }
 
-fn float_layers(layers: &[DenseLayer], inputs: usize) -> Vec<Dense> {
+fn float_layers(layers: &[DenseLayer], inputs: usize, tanh_error: f64) -> Vec<Dense> {
     let mut width = inputs;
     let layers = layers.iter().map(|layer| {
-        let dense = Dense::float(layer, width);
+        let dense = Dense::float(layer, width, tanh_error);
         width = layer.outputs();
         dense
     });
@@ -217,10 +227,10 @@ fn fitting_unit(layer: &StoredIntegerLayer, float: &DenseLayer, row_factors: &[f
 }
 
 /// Largest error of the integer tanh over all of its arguments.
-fn tanh_error(limit: i32) -> f64 {
+fn tanh_error(limit: u16) -> f64 {
     let error = |code: i16| {
         let exact = (f64::from(code) / f64::from(TANH_INPUT_ONE)).tanh();
-        (f64::from(tanh_code(code)) / f64::from(limit) - exact).abs()
+        (f64::from(tanh_code(code, limit)) / f64::from(limit) - exact).abs()
     };
     (i16::MIN..=i16::MAX).map(error).fold(0.0, f64::max)
 }

@@ -40,7 +40,7 @@ fn every_row_has_the_bits_of_a_single_evaluation() {
             seen += 1;
         });
         assert_eq!(seen, all.len());
-        for precision in [Precision::Float, Precision::Int8] {
+        for precision in [Precision::Float, Precision::Int8, Precision::Int16] {
             let bytes = encode(&description(inputs), Some(&float), precision, &calibration).unwrap();
             let model = Model::from_bytes(&bytes).unwrap();
             let mut scratch = Scratch::new();

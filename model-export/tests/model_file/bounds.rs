@@ -116,7 +116,7 @@ proptest! {
         let points = points(&mut numbers, &envelope, 300);
         // Narrow: calibrated where the box is not, so that codes saturate.
         let calibration: Vec<Vec<f32>> = if narrow { rows(&mut numbers, &float, 3) } else { points[..40].to_vec() };
-        for precision in [Precision::Float, Precision::Int8] {
+        for precision in [Precision::Float, Precision::Int8, Precision::Int16] {
             match encode(&boxed(inputs, envelope.clone()), Some(&float), precision, &calibration) {
                 Ok(bytes) => drop(check(&bytes, &float, &points)),
                 Err(error) => prop_assert!(error.to_string().contains("too large"), "{error}"),
@@ -181,9 +181,9 @@ fn steepest(float: &FloatNetwork, points: &[Vec<f32>], output: usize) -> f64 {
 #[test]
 fn bounds_are_near_what_sampling_finds() {
     for (name, hidden, width, most) in [
-        ("20-32x2-2 relu, narrow box", vec![(32, Relu); 2], 0.2, [2.5, 16.0, 8.0]),
-        ("20-32x2-2 tanh", vec![(32, Tanh); 2], 1.0, [3.0, 35.0, 12.0]),
-        ("20-32x2-2 relu", vec![(32, Relu); 2], 4.0, [4.5, 300.0, 15.0]),
+        ("20-32x2-2 relu, narrow box", vec![(32, Relu); 2], 0.2, [2.5, 45.0, 8.0]),
+        ("20-32x2-2 tanh", vec![(32, Tanh); 2], 1.0, [3.0, 80.0, 12.0]),
+        ("20-32x2-2 relu", vec![(32, Relu); 2], 4.0, [4.5, 700.0, 15.0]),
     ] {
         let mut numbers = Numbers(4);
         let float = network(&mut numbers, 20, &hidden, 2, true);
