@@ -19,6 +19,9 @@ use std::{hint::black_box, time::Instant};
 
 const ROWS: usize = 1024;
 
+/// One evaluation of all rows.
+type Pass<'a> = Box<dyn FnMut() + 'a>;
+
 /// Within ±1, the same in every run.
 fn number(state: &mut u64) -> f32 {
     *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -103,7 +106,7 @@ fn batch(criterion: &mut Criterion) {
         let mut integer_batch = Batch::of_model(&model).expect("has one");
         let mut scratch = Scratch::new();
         let mut outputs = [0.0; MAX_OUTPUTS];
-        let mut passes: [(&str, Box<dyn FnMut() + '_>); 4] = [
+        let mut passes: [(&str, Pass<'_>); 4] = [
             ("float, one by one", Box::new(|| rows.iter().for_each(|row| drop(black_box(float.evaluate(row)))))),
             (
                 "float, batch",

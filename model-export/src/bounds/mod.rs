@@ -3,13 +3,13 @@
 //! *in* the network of a model file as the firmware evaluates it, the float network it was made from, and the envelope (smallest and
 //! largest value of each feature); *out* for each output, in its unit,
 //!
-//! - the range of what the firmware can give ([`propagation`]),
-//! - the largest difference between the firmware's output and [`FloatNetwork::evaluate`] ([`difference`]),
+//! - the range of what the firmware can give (back-substitution, `propagation.rs`),
+//! - the largest difference between the firmware's output and [`FloatNetwork::evaluate`] (interval Jacobians, `difference.rs`),
 //! - a Lipschitz constant of the float network: |Δ output| ≤ L · max |Δ input|, the inputs normalised, both points in the box
 //!   (integer arithmetic moves in steps: add twice the largest difference);
 //!
 //! *never* a bound that a point of the box breaks, f32 rounding, codes, saturation and the tanh table included; *source* the named
-//! modules. Everything is computed in f64, whose own rounding is covered by [`MARGIN`] of every sum of magnitudes, and rounded outward
+//! files. Everything is computed in f64, whose own rounding is covered by 1e-12 of every sum of magnitudes, and rounded outward
 //! to f32 in the end.
 
 mod difference;

@@ -16,9 +16,12 @@ fn bits(values: &[f32]) -> Vec<u32> {
     values.iter().map(|value| (value + 0.0).to_bits()).collect()
 }
 
+/// Inputs, hidden layers, skip.
+type Shape<'a> = (usize, &'a [(usize, Activation)], bool);
+
 #[test]
 fn every_row_has_the_bits_of_a_single_evaluation() {
-    let shapes: [(usize, &[(usize, Activation)], bool); 6] = [
+    let shapes: [Shape<'_>; 6] = [
         (1, &[], true),
         (3, &[(5, Tanh)], true),
         (12, &[(128, Relu), (128, Relu)], false),
@@ -61,8 +64,8 @@ fn calibration_sees_the_largest_magnitude_of_every_layer() {
     let mut expected = vec![0.0f32; 4];
     for row in &all {
         let mut values: Vec<f32> = (0..5).map(|i| (row[i] - float.input_mean[i]) / float.input_scale[i]).collect();
-        for index in 0..4 {
-            expected[index] = values.iter().fold(expected[index], |largest, value| largest.max(value.abs()));
+        for (index, expected) in expected.iter_mut().enumerate() {
+            *expected = values.iter().fold(*expected, |largest, value| largest.max(value.abs()));
             if let Some(layer) = float.layers.get(index) {
                 values = layer.evaluate(&values);
             }
