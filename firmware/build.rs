@@ -9,6 +9,11 @@ const MODEL_VARIABLE: &str = "IMPROMPTU_MODEL";
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=build.rs");
+    // The stable compiler does not tell whether a target has the DSP instructions; of its targets, this one has, and the FPU too.
+    println!("cargo::rustc-check-cfg=cfg(cortex_m4)");
+    if env::var("TARGET")? == "thumbv7em-none-eabihf" {
+        println!("cargo::rustc-cfg=cortex_m4");
+    }
     if env::var("CARGO_CFG_TARGET_OS")? != "none" {
         return Ok(());
     }

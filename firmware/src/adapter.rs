@@ -9,7 +9,7 @@ use crate::{
     feedback::AxisState,
     math::{clamp, finite_or_zero},
     model::{Card, Interpolation, MAX_AXES, MAX_ERRORS, MAX_FEATURES, MAX_OUTPUTS, Model, Refusal, SignalTable},
-    network::Scratch,
+    network::{MAX_SCRATCH, Network, Scratch},
     preview::{EndRule, Preview},
 };
 
@@ -61,9 +61,10 @@ impl<const D: usize, const M: usize, const R: usize, const N: usize> Signals for
     }
 }
 
-/// Adapter for a loop with `D` desired, `M` measured and `R` reference channels.
+/// Adapter for a loop with `D` desired, `M` measured and `R` reference channels, and a scratch of `S` words for the network (without a
+/// number: enough for any network).
 #[derive(Debug)]
-pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
+pub struct Adapter<'m, const D: usize, const M: usize, const R: usize, const S: usize = MAX_SCRATCH> {
     model: &'m Model<'m>,
     /// Desired channel from which each reference channel starts.
     base: [usize; R],
@@ -82,15 +83,15 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
     loop_gain: f32,
     /// Recent peak of what is desired of the loop and of its errors ([`crate::model::Authority`]).
     vigour: f32,
-    scratch: Scratch,
+    scratch: Scratch<S>,
 }
 
-impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
+impl<'m, const D: usize, const M: usize, const R: usize, const S: usize> Adapter<'m, D, M, R, S> {
     /// Ties a model to an application whose signals are `table`, whose references run at `rate_hz` and whose preview keeps
     /// `capacity` samples. Both lanes are off.
     ///
     /// # Errors
-    /// If signals, rate or preview length do not fit.
+    /// If signals, rate, preview length or scratch do not fit.
     pub fn new(model: &'m Model<'m>, table: &SignalTable<'_>, rate_hz: f32, capacity: usize) -> Result<Self, Refusal> {
         let card = model.card();
         same_signals(card, table, [D, M, R])?;
@@ -102,6 +103,10 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         let (past, future) = card.preview_span();
         if past + future + 1 > capacity as u32 {
             return Err(Refusal::Preview { needed: past + future + 1, available: capacity as u32 });
+        }
+        let words = model.network().map_or(0, Network::scratch_words);
+        if words > S {
+            return Err(Refusal::Shape { what: "words of the network's scratch", found: words as u32, limit: S as u32 });
         }
         Ok(Self {
             model,
@@ -119,7 +124,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             saturations: 0,
             loop_gain: 1.0,
             vigour: 0.0,
-            scratch: Scratch::new(),
+            scratch: Scratch::sized(),
         })
     }
 

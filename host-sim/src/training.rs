@@ -5,15 +5,13 @@
 //! ```
 //!
 //! A training runs on one thread; several may run side by side. The same data, settings and seed give the same network, bit
-//! for bit, on x86-64 processors with AVX2 or more and, much slower, without: see `matrix_kernel`. Only the ridge solution
+//! for bit, on x86-64 processors with AVX2 or more and, much slower, without: see [`matrix_kernel`]. Only the ridge solution
 //! may differ in its last bits between processors of different kinds.
 
 mod backpropagation;
 pub mod dataset;
 mod elementwise;
 mod loss;
-pub mod matrix_kernel;
-pub mod padded_matrix;
 pub mod quantisation;
 pub mod ridge;
 pub mod settings;
@@ -21,6 +19,7 @@ mod standardised;
 pub mod trainer;
 
 pub use dataset::{Dataset, DatasetError, RowMatrix};
+pub use impromptu_model_export::batch::{matrix_kernel, padded_matrix};
 pub use ridge::{Ridge, RidgeError};
 pub use settings::{FakeQuantisation, Loss, Schedule, SettingsError, Skip, TrainingSettings};
 pub use trainer::NetworkTrainer;

@@ -6,14 +6,17 @@ use impromptu_firmware::{
         self, Arithmetic, Authority, Card, Channel, LaneAxis, LaneLayout, LayerLayout, Model, NetworkLayout, Probes, Refusal,
         Section, SignalTable, file,
     },
-    network::{self, ROWS, Scratch},
+    network::{self, Scratch, kernel::Width},
 };
 
 use crate::{
+    bounds::bounds,
     description::{ChannelDescription, Description},
     export_error::ExportError,
-    float_network::{Activation, FloatNetwork},
-    quantise::{IntegerLayer, quantise},
+    float_network::{Activation, DenseLayer, FloatNetwork},
+    packing,
+    quantise::quantise,
+    stored_network::StoredNetwork,
 };
 
 /// Number format of the dense layers.
@@ -21,8 +24,10 @@ use crate::{
 pub enum Precision {
     /// f32 weights and activations.
     Float,
-    /// int8 weights, 16-bit activations.
+    /// int8 weights, activations of up to 16 bits.
     Int8,
+    /// int16 weights, activations of up to 16 bits.
+    Int16,
 }
 
 /// Bulk numbers in file order, each section aligned.
@@ -41,29 +46,9 @@ impl BlobWriter {
         self.bytes(values.into_iter().flat_map(f32::to_le_bytes))
     }
 
-    fn integers(&mut self, values: impl IntoIterator<Item = i32>) -> Section {
-        self.bytes(values.into_iter().flat_map(i32::to_le_bytes))
+    fn words(&mut self, words: Vec<u32>) -> Section {
+        self.bytes(words.into_iter().flat_map(u32::to_le_bytes))
     }
-}
-
-/// Rows in the kernel's order: `[block of 8 rows][input][row in block]`, the last block padded with `zero`.
-fn packed<T: Copy>(rows: &[T], inputs: usize, zero: T) -> Vec<T> {
-    let outputs = rows.len() / inputs.max(1);
-    let mut packed = Vec::with_capacity(network::padded(outputs) * inputs);
-    for block in (0..outputs).step_by(ROWS) {
-        for input in 0..inputs {
-            packed.extend(
-                (block..block + ROWS)
-                    .map(|row| rows.get(row * inputs + input).filter(|_| row < outputs).copied().unwrap_or(zero)),
-            );
-        }
-    }
-    packed
-}
-
-fn padded<T: Copy>(values: &[T], zero: T) -> impl Iterator<Item = T> + '_ {
-    let missing = network::padded(values.len()) - values.len();
-    values.iter().copied().chain(std::iter::repeat_n(zero, missing))
 }
 
 fn bounded<T: Clone, const N: usize>(values: &[T], what: &'static str) -> Result<heapless::Vec<T, N>, ExportError> {
@@ -91,6 +76,7 @@ fn layout(
     network: &FloatNetwork,
     precision: Precision,
     calibration: &[Vec<f32>],
+    envelope: &[(f32, f32)],
     blob: &mut BlobWriter,
 ) -> Result<NetworkLayout, ExportError> {
     let reciprocal = network.input_scale.iter().map(|scale| 1.0 / scale);
@@ -103,61 +89,47 @@ fn layout(
         output_normalisation: blob.floats(network.output_scale.iter().chain(&network.output_mean).copied()),
     };
     if let Some(skip) = &network.skip {
-        layout.skip = blob.floats(packed(skip, network.inputs(), 0.0));
+        layout.skip = blob.words(packing::float(skip, &vec![0.0; network.outputs()], network.inputs()));
     }
-    let mut inputs = network.inputs();
     let mut layers = Vec::new();
     // Before any count is narrowed to the file's integers.
     within(network.layers.len(), "dense layers", model::MAX_LAYERS)?;
     network.layers.iter().try_for_each(|layer| within(layer.outputs(), "units in a layer", model::MAX_WIDTH))?;
-    match precision {
-        Precision::Float => {
-            for layer in &network.layers {
-                layers.push(LayerLayout {
-                    inputs: inputs as u16,
-                    outputs: layer.outputs() as u16,
-                    activation: activation(layer.activation),
-                    weights: blob.floats(packed(&layer.weights, inputs, 0.0)),
-                    bias: blob.floats(padded(&layer.bias, 0.0)),
-                    requantisation: Section::default(),
-                });
-                inputs = layer.outputs();
+    let mut inputs = network.inputs();
+    let mut layer = |source: &DenseLayer, input_limit: u16, rows: Section| {
+        let (from, outputs) = (inputs as u16, source.outputs() as u16);
+        inputs = source.outputs();
+        layers.push(LayerLayout { inputs: from, outputs, activation: activation(source.activation), input_limit, rows });
+    };
+    let width = match precision {
+        Precision::Float => None,
+        Precision::Int8 => Some((Width::Int8, Arithmetic::Int8)),
+        Precision::Int16 => Some((Width::Int16, Arithmetic::Int16)),
+    };
+    match width {
+        None => {
+            for source in &network.layers {
+                let count = source.weights.len() / source.outputs().max(1);
+                layer(source, 0, blob.words(packing::float(&source.weights, &source.bias, count)));
             }
         }
-        Precision::Int8 => {
+        Some((width, arithmetic)) => {
             if calibration.is_empty() && !network.layers.is_empty() {
                 return Err(ExportError::NoCalibration);
             }
-            let integers = quantise(network, calibration.iter().map(Vec::as_slice));
-            layout.arithmetic = Arithmetic::Int8;
+            let integers = quantise(network, width, calibration.iter().map(Vec::as_slice), envelope);
+            layout.arithmetic = arithmetic;
             layout.input_code = integers.input_code;
-            for (index, layer) in integers.layers.iter().enumerate() {
-                if let Some(row) = layer.multipliers.iter().position(|multiplier| *multiplier == i32::MAX) {
+            for (index, (source, integer)) in network.layers.iter().zip(&integers.layers).enumerate() {
+                if let Some(row) = integer.multipliers.iter().position(|multiplier| *multiplier == i32::MAX) {
                     return Err(ExportError::Steep { layer: index, row });
                 }
-                layers.push(integer_layout(layer, inputs, blob));
-                inputs = layer.bias.len();
+                layer(source, integer.input_limit, blob.words(packing::integer(integer, width)));
             }
         }
     }
     layout.layers = bounded(&layers, "dense layers")?;
     Ok(layout)
-}
-
-fn integer_layout(layer: &IntegerLayer, inputs: usize, blob: &mut BlobWriter) -> LayerLayout {
-    let weights = packed(&layer.weights, inputs, 0).into_iter().map(|weight| weight as u8);
-    LayerLayout {
-        inputs: inputs as u16,
-        outputs: layer.bias.len() as u16,
-        activation: activation(layer.activation),
-        weights: blob.bytes(weights),
-        bias: blob.integers(padded(&layer.bias, 0)),
-        requantisation: if layer.multipliers.is_empty() {
-            blob.floats(padded(&layer.row_scales, 0.0))
-        } else {
-            blob.integers(padded(&layer.multipliers, 0))
-        },
-    }
 }
 
 fn channels<'a, const N: usize>(
@@ -229,7 +201,8 @@ pub fn encode(
         }
     }
     let mut blob = BlobWriter::default();
-    let network = network.map(|network| layout(network, precision, calibration, &mut blob)).transpose()?;
+    let float = network;
+    let network = network.map(|network| layout(network, precision, calibration, &description.envelope, &mut blob)).transpose()?;
     let lane = lane(description, &mut blob)?;
     let minima = description.envelope.iter().map(|(low, _)| *low);
     let maxima = description.envelope.iter().map(|(_, high)| *high);
@@ -263,8 +236,12 @@ pub fn encode(
         network,
         lane,
         envelope: blob.floats(minima.chain(maxima)),
+        bounds: Section::default(),
         probes: Probes::default(),
     };
+    if let Some(float) = float {
+        card.bounds = blob.floats(output_bounds(&card, &blob, float, &description.envelope)?);
+    }
     let lane_outputs = card.lane.as_ref().map_or(0, |lane| lane.axes.len());
     // The probes' expected outputs come from the firmware itself, out of a file without probes.
     let bare_lane = Section { offset: 0, length: 0 };
@@ -296,6 +273,17 @@ fn probe_rows(description: &Description, calibration: &[Vec<f32>]) -> Vec<Vec<f3
 fn ticks(field: &'static str, seconds: f32, rate_hz: f32) -> Result<u16, ExportError> {
     let ticks = (seconds * rate_hz).round();
     if (0.0..=f32::from(u16::MAX)).contains(&ticks) { Ok(ticks as u16) } else { Err(ExportError::Time { field, seconds }) }
+}
+
+/// Bounds of the network that the blob holds, output by output.
+fn output_bounds(
+    card: &Card<'_>,
+    blob: &BlobWriter,
+    float: &FloatNetwork,
+    envelope: &[(f32, f32)],
+) -> Result<Vec<f32>, ExportError> {
+    let stored = StoredNetwork::of_card(card, &model::Blob::new(&blob.0)).ok_or(ExportError::Refused(Refusal::Card))?;
+    Ok(bounds(&stored, float, envelope).iter().flat_map(model::OutputBounds::numbers).collect())
 }
 
 /// What the firmware computes for the probes.

@@ -38,7 +38,7 @@ pub enum ExportError {
     },
     /// Weights so large that one step of a row's accumulator is more than half a step of the pre-activation.
     #[error(
-        "layer {layer}, row {row}: weights too large for int8 arithmetic: train with weight decay or export with --precision float"
+        "layer {layer}, row {row}: weights too large for integer arithmetic: train with weight decay or export with --precision float"
     )]
     Steep {
         /// Layer, from 0.
@@ -57,7 +57,7 @@ pub enum ExportError {
         limit: usize,
     },
     /// Quantisation without rows to calibrate on.
-    #[error("int8 needs rows to calibrate on: give --calibration FILE.csv")]
+    #[error("int8 and int16 need rows to calibrate on: give --calibration FILE.csv")]
     NoCalibration,
     /// The firmware refuses the file that came out.
     #[error("the firmware refuses the result: {0}")]

@@ -7,7 +7,7 @@ mod text;
 
 use impromptu_firmware::{
     features::{Feature, Relative, Source},
-    model::{Arithmetic, Card, Channel, Interpolation, Margins, Model, Section, file},
+    model::{Arithmetic, Card, Channel, Interpolation, Margins, Model, OutputBounds, Reach, Section, file},
     network::Activation,
 };
 use serde::Serialize;
@@ -103,12 +103,29 @@ pub struct InspectedOutput {
     pub limit: f32,
     /// Largest change in a second, unit/s.
     pub slew_per_second: f32,
+    /// What the network lane can give inside of the training envelope.
+    pub bounds: Option<InspectedBounds>,
+}
+
+/// Proven bounds of an output, in its unit; features within their ranges in training.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct InspectedBounds {
+    /// Smallest correction of the network.
+    pub low: f32,
+    /// Largest.
+    pub high: f32,
+    /// Whether the network reaches the limit: `never`, `possibly` or `always`.
+    pub reaches_limit: &'static str,
+    /// Largest difference from the float network that the file was made from.
+    pub difference: f32,
+    /// Largest change when every input moves by at most its scale.
+    pub lipschitz: f32,
 }
 
 /// Shape and cost of the network lane.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct InspectedNetwork {
-    /// `float` or `int8`.
+    /// `float`, `int8` or `int16`.
     pub arithmetic: &'static str,
     /// Inputs.
     pub inputs: usize,
@@ -162,9 +179,16 @@ impl Inspection {
         let features = card.features.iter().zip(low.iter().zip(high.iter()));
         let (card_bytes, blob_bytes) = file::split(bytes).map_or((0, 0), |(card, blob)| (card.len(), blob.len()));
         let rate = timing.reference_rate_hz;
-        let outputs = card.outputs.iter().map(|output| {
+        let bounds = model.bounds().iter().map(Some).chain(std::iter::repeat(None));
+        let outputs = card.outputs.iter().zip(bounds).map(|(output, bounds)| {
             let (name, unit) = channel(&card.signals.reference, output.channel);
-            InspectedOutput { name: name.into(), unit: unit.into(), limit: output.limit, slew_per_second: output.slew * rate }
+            InspectedOutput {
+                name: name.into(),
+                unit: unit.into(),
+                limit: output.limit,
+                slew_per_second: output.slew * rate,
+                bounds: bounds.map(|bounds| inspected_bounds(bounds, output.limit)),
+            }
         });
         Self {
             name: card.name.into(),
@@ -220,14 +244,29 @@ fn inspected_feature(card: &Card<'_>, feature: &Feature, low: f32, high: f32) ->
     InspectedFeature { quantity: format!("{signal} {name}{origin}"), unit: unit.into(), offset: feature.offset, low, high }
 }
 
+fn inspected_bounds(bounds: OutputBounds, limit: f32) -> InspectedBounds {
+    InspectedBounds {
+        low: bounds.low,
+        high: bounds.high,
+        reaches_limit: match bounds.reach(limit) {
+            Reach::Within => "never",
+            Reach::Partly => "possibly",
+            Reach::Beyond => "always",
+        },
+        difference: bounds.difference,
+        lipschitz: bounds.lipschitz,
+    }
+}
+
 fn network(model: &Model<'_>) -> Option<InspectedNetwork> {
     let layout = model.card().network.as_ref()?;
-    let layers = layout.layers.iter().flat_map(|layer| [layer.weights, layer.bias, layer.requantisation]);
+    let layers = layout.layers.iter().map(|layer| layer.rows);
     let sections = layers.chain([layout.input_normalisation, layout.skip, layout.output_normalisation]);
     Some(InspectedNetwork {
         arithmetic: match layout.arithmetic {
             Arithmetic::Float => "float",
             Arithmetic::Int8 => "int8",
+            Arithmetic::Int16 => "int16",
         },
         inputs: model.card().features.len(),
         layers: layout.layers.iter().map(|layer| (layer.outputs, layer.activation)).collect(),

@@ -3,13 +3,10 @@
 use std::fmt;
 
 use comfy_table::{Table, presets};
-use impromptu_firmware::{
-    model::{MAX_OUTPUTS, Model},
-    network::Scratch,
-};
+use impromptu_firmware::model::Model;
 use serde::Serialize;
 
-use crate::float_network::FloatNetwork;
+use crate::{batch::Batch, float_network::FloatNetwork};
 
 /// Difference between a float network and a model file over rows of features.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -28,19 +25,21 @@ pub struct Difference {
 pub fn difference(model: &Model<'_>, network: &FloatNetwork, rows: &[Vec<f32>]) -> Difference {
     let zeros = vec![0.0; network.outputs()];
     let mut difference = Difference { rows: rows.len(), rms: zeros.clone(), largest: zeros.clone(), correction_rms: zeros };
-    let mut scratch = Scratch::new();
-    for row in rows {
-        let mut found = [0.0; MAX_OUTPUTS];
-        if let Some(quantised) = model.network() {
-            quantised.evaluate(row, &mut found, &mut scratch);
-        }
-        for (index, (expected, found)) in network.evaluate(row).iter().zip(found).enumerate() {
-            let error = f64::from(*expected) - f64::from(found);
+    let mut found = vec![0.0f32; rows.len() * network.outputs()];
+    if let Some(mut stored) = Batch::of_model(model) {
+        stored.evaluate(rows.iter().map(Vec::as_slice), |row, outputs| {
+            found[row * network.outputs()..][..network.outputs()].copy_from_slice(outputs);
+        });
+    }
+    Batch::of_network(network).evaluate(rows.iter().map(Vec::as_slice), |row, expected| {
+        let found = &found[row * network.outputs()..];
+        for (index, (expected, found)) in expected.iter().zip(found).enumerate() {
+            let error = f64::from(*expected) - f64::from(*found);
             difference.rms[index] += error * error;
             difference.largest[index] = difference.largest[index].max(error.abs());
             difference.correction_rms[index] += f64::from(*expected).powi(2);
         }
-    }
+    });
     let count = rows.len().max(1) as f64;
     difference.rms.iter_mut().chain(&mut difference.correction_rms).for_each(|sum| *sum = (*sum / count).sqrt());
     difference
@@ -57,6 +56,8 @@ pub struct OutputComparison {
     pub rms: f64,
     /// Largest difference, in the unit.
     pub largest: f64,
+    /// Largest difference that is possible with features within their ranges in training: the file's bound, in the unit.
+    pub bound: f64,
     /// RMS of the float network's correction, in the unit.
     pub correction_rms: f64,
     /// RMS difference in percent of that; none if there is no correction.
@@ -104,7 +105,7 @@ pub fn compare(model: &Model<'_>, network: &FloatNetwork, rows: &[Vec<f32>]) -> 
         return Err(ComparisonError::Shape { what, expected, found });
     }
     let difference = difference(model, network, rows);
-    let outputs = card.outputs.iter().enumerate().map(|(index, output)| {
+    let outputs = card.outputs.iter().zip(model.bounds().iter()).enumerate().map(|(index, (output, bounds))| {
         let channel = card.signals.reference.get(usize::from(output.channel));
         let (rms, correction_rms) = (difference.rms[index], difference.correction_rms[index]);
         OutputComparison {
@@ -112,6 +113,7 @@ pub fn compare(model: &Model<'_>, network: &FloatNetwork, rows: &[Vec<f32>]) -> 
             unit: channel.map_or("", |channel| channel.unit).into(),
             rms,
             largest: difference.largest[index],
+            bound: bounds.difference.into(),
             correction_rms,
             rms_percent: (correction_rms > 0.0).then(|| 100.0 * rms / correction_rms),
         }
@@ -122,7 +124,15 @@ pub fn compare(model: &Model<'_>, network: &FloatNetwork, rows: &[Vec<f32>]) -> 
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut table = Table::new();
-        table.load_style(presets::NOTHING).set_header(["output", "unit", "correction RMS", "difference RMS", "largest", "RMS %"]);
+        table.load_style(presets::NOTHING).set_header([
+            "output",
+            "unit",
+            "correction RMS",
+            "difference RMS",
+            "largest",
+            "bound",
+            "RMS %",
+        ]);
         for output in &self.outputs {
             table.add_row([
                 output.name.clone(),
@@ -130,6 +140,7 @@ impl fmt::Display for Comparison {
                 format!("{:.4e}", output.correction_rms),
                 format!("{:.3e}", output.rms),
                 format!("{:.3e}", output.largest),
+                format!("{:.3e}", output.bound),
                 output.rms_percent.map_or("-".into(), |percent| format!("{percent:.4}")),
             ]);
         }

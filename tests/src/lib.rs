@@ -1,7 +1,8 @@
-//! What the promises need to be tested: the emulated microcontroller, its cycle model, golden texts. The promises themselves are in
-//! `tests/`.
+//! What the promises need to be tested: the emulated microcontroller, its cycle model, golden texts, bytes for the decoder. The
+//! promises themselves are in `tests/`.
 
 pub mod board;
+pub mod decoder;
 pub mod emulator;
 pub mod golden;
 pub mod mcu;

@@ -1,6 +1,6 @@
 //! Bulk numbers, read in place.
 //!
-//! *in* the bytes behind the card; *out* little-endian f32, i32 and i8 arrays; *never* a copy, never out of range:
+//! *in* the bytes behind the card; *out* little-endian f32 and words; *never* a copy, never out of range:
 //! an array that does not fit is refused at load; *source* the file format in [`super::file`].
 //! Every section starts at a multiple of 16 bytes from the file's start, so a file that is placed on a 16-byte boundary
 //! can also be read by kernels that load words.
@@ -49,21 +49,21 @@ impl<'a> Floats<'a> {
     }
 }
 
-/// A borrowed array of little-endian i32.
+/// A borrowed array of words, not yet interpreted: the streams of [`crate::network::kernel`].
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Integers<'a>(&'a [[u8; 4]]);
+pub struct Words<'a>(&'a [[u8; 4]]);
 
-impl<'a> Integers<'a> {
-    /// The elements in order.
-    #[inline]
-    pub fn iter(&self) -> impl ExactSizeIterator<Item = i32> + Clone + use<'a> {
-        self.0.iter().map(|bytes| i32::from_le_bytes(*bytes))
+impl<'a> Words<'a> {
+    /// All of them, each little-endian.
+    #[inline(always)]
+    pub fn all(&self) -> &'a [[u8; 4]] {
+        self.0
     }
 
-    /// Blocks of `N` elements; a tail shorter than that is left out.
+    /// Pieces of `count` words; a tail shorter than that is left out.
     #[inline]
-    pub fn blocks<const N: usize>(&self) -> impl ExactSizeIterator<Item = [i32; N]> + use<'a, N> {
-        self.0.as_chunks::<N>().0.iter().map(|block| block.map(i32::from_le_bytes))
+    pub fn chunks(&self, count: usize) -> impl ExactSizeIterator<Item = &'a [[u8; 4]]> + Clone + use<'a> {
+        self.0.chunks_exact(count.max(1))
     }
 }
 
@@ -96,8 +96,8 @@ impl<'a> Blob<'a> {
         if floats.iter().all(f32::is_finite) { Ok(floats) } else { Err(Refusal::NotFinite { what }) }
     }
 
-    /// A section of `count` i32.
-    pub fn integers(&self, section: Section, count: usize, what: &'static str) -> Result<Integers<'a>, Refusal> {
-        Ok(Integers(self.bytes(section, count * 4, what)?.as_chunks().0))
+    /// A section of `count` words.
+    pub fn words(&self, section: Section, count: usize, what: &'static str) -> Result<Words<'a>, Refusal> {
+        Ok(Words(self.bytes(section, count * 4, what)?.as_chunks().0))
     }
 }

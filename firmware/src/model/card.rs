@@ -126,8 +126,10 @@ pub struct Output {
 pub enum Arithmetic {
     /// f32 weights and activations.
     Float,
-    /// int8 weights with a scale for each row, 16-bit activations, 32-bit accumulators.
+    /// int8 weights with a scale for each row, activations of at most 16 bits, 32-bit accumulators.
     Int8,
+    /// The same with int16 weights.
+    Int16,
 }
 
 /// One dense layer; the meaning of the sections follows from [`Arithmetic`].
@@ -139,13 +141,10 @@ pub struct LayerLayout {
     pub outputs: u16,
     /// Activation.
     pub activation: Activation,
-    /// Packed weights (order: [`crate::network`]).
-    pub weights: Section,
-    /// Bias of each output: f32, or i32 in units of the accumulator.
-    pub bias: Section,
-    /// int8 only. Hidden layer: i32 multiplier of each row, value = (accumulator × multiplier) / 2³².
-    /// Last layer: f32 scale of each row.
-    pub requantisation: Section,
+    /// Integers only: largest magnitude of an input's code, 1..=32,767. The largest for which no accumulator can overflow is best.
+    pub input_limit: u16,
+    /// Biases, weights and requantisation of all rows: the stream in [`crate::network::kernel`].
+    pub rows: Section,
 }
 
 /// The network: normalise, dense layers plus a linear skip from the normalised inputs, denormalise.
@@ -155,11 +154,11 @@ pub struct NetworkLayout {
     pub arithmetic: Arithmetic,
     /// f32 pairs: mean and reciprocal scale of each input, all means first.
     pub input_normalisation: Section,
-    /// int8 only: f32 factor from a normalised input to its 16-bit code.
+    /// Integers only: factor from a normalised input to its code.
     pub input_code: f32,
     /// Dense layers; empty for a purely linear model.
     pub layers: Vec<LayerLayout, MAX_LAYERS>,
-    /// f32 skip weights from normalised inputs to normalised outputs, packed as a float layer's; empty: none.
+    /// Skip from normalised inputs to normalised outputs, packed as a float layer without bias (zeros); empty: none.
     pub skip: Section,
     /// f32: scale of each output, then mean of each output.
     pub output_normalisation: Section,
@@ -259,6 +258,8 @@ pub struct Card<'a> {
     pub lane: Option<LaneLayout>,
     /// f32: smallest, then largest value of each feature in training.
     pub envelope: Section,
+    /// f32: low, high, difference, lipschitz ([`super::OutputBounds`]) of each output; empty without a network.
+    pub bounds: Section,
     /// Probes.
     pub probes: Probes,
 }

@@ -14,7 +14,25 @@
 //! | 24..32 | zero |
 //! | 32.. | the card ([`super::Card`] in postcard), then zeros up to a multiple of 16, then the blob |
 //!
-//! All numbers are little-endian.
+//! All numbers are little-endian. The card is the fields of [`super::Card`] in their order, without names: integers of more than a byte as
+//! varints, f32 in four bytes, texts and lists behind their length, an option behind 0 or 1, the variant of an enum as its number.
+//!
+//! Sections of the blob, each at a multiple of 16 bytes, in the order in which `model-export` writes them (a reader goes by the card's
+//! offsets; f features, o outputs, sizes in words of four bytes):
+//!
+//! | section | words | content |
+//! |---|--:|---|
+//! | input normalisation | 2 f | f32 mean of each input, then reciprocal scale of each |
+//! | output normalisation | 2 o | f32 scale of each output, then mean of each |
+//! | skip | blocks of 8 outputs × 8 (1 + f padded to 2) | a float stream ([`crate::network::kernel`]) |
+//! | rows of each layer | as its kernel asks for | a float or integer stream |
+//! | coefficients of each lane axis | lags (errors + 1) | f32, newest lag first: each error's, then the output's own |
+//! | envelope | 2 f | f32 smallest value of each feature in training, then largest of each |
+//! | bounds | 4 o, none without a network | f32 low, high, difference, lipschitz of each output ([`super::OutputBounds`]) |
+//! | network probes | probes × (f + o) | f32 features of each probe, then outputs of each |
+//! | lane probe | axes | f32 outputs ([`crate::feedback::probe`]) |
+//!
+//! Version 1 is frozen: `tests/golden/models` holds the exact bytes of small models, which every build of this version reads and writes.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 

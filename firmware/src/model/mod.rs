@@ -4,6 +4,7 @@
 //! any bytes; *source* [`mod@file`] for the layout, [`Card`] for the fields.
 
 mod blob;
+mod bounds;
 mod card;
 mod counts;
 pub mod file;
@@ -11,7 +12,8 @@ mod place;
 mod refusal;
 mod validate;
 
-pub use blob::{Blob, Floats, Integers};
+pub use blob::{Blob, Floats, Words};
+pub use bounds::{Bounds, OutputBounds, Reach};
 pub use card::*;
 pub use place::Place;
 pub use refusal::Refusal;
@@ -22,9 +24,11 @@ use crate::{feedback::Lane, network::Network};
 #[derive(Debug)]
 pub struct Model<'a> {
     card: Card<'a>,
+    blob: Blob<'a>,
     network: Option<Network<'a>>,
     lane: Option<Lane<'a>>,
     envelope: (Floats<'a>, Floats<'a>),
+    bounds: Bounds<'a>,
     checksum: u32,
 }
 
@@ -53,13 +57,19 @@ impl<'a> Model<'a> {
         if envelope.0.iter().zip(envelope.1.iter()).any(|(low, high)| low > high) {
             return Err(Refusal::Value { what: "envelope" });
         }
-        validate::probes(&card, &blob, network.as_ref(), lane.as_ref())?;
-        Ok(Self { card, network, lane, envelope, checksum: file::checksum(bytes) })
+        let bounds = Bounds::new(&card, &blob)?;
+        validate::probes(&card, &blob, network.as_ref().map(|network| (network, &envelope, &bounds)), lane.as_ref())?;
+        Ok(Self { card, blob, network, lane, envelope, bounds, checksum: file::checksum(bytes) })
     }
 
     /// What the model says of itself.
     pub fn card(&self) -> &Card<'a> {
         &self.card
+    }
+
+    /// The bulk numbers to which the card's sections point.
+    pub fn blob(&self) -> &Blob<'a> {
+        &self.blob
     }
 
     /// The network lane's map.
@@ -75,6 +85,11 @@ impl<'a> Model<'a> {
     /// Smallest and largest value of each feature in training.
     pub fn envelope(&self) -> (Floats<'a>, Floats<'a>) {
         self.envelope
+    }
+
+    /// What the network can do inside of the envelope.
+    pub fn bounds(&self) -> &Bounds<'a> {
+        &self.bounds
     }
 
     /// CRC-32 that identifies the file.

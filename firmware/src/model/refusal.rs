@@ -96,6 +96,16 @@ pub enum Refusal {
         /// Index of the probe; `u8::MAX` for the feedback lane's.
         index: u8,
     },
+    /// A probe inside of the envelope gives an output that the stored bounds exclude.
+    Bounds {
+        /// Index of the output.
+        output: u8,
+    },
+    /// All that the network gives inside of the envelope lies beyond the output's limit.
+    Limit {
+        /// Index of the output.
+        output: u8,
+    },
     /// The signal tables of the model and of the application differ.
     Signal {
         /// `desired`, `measured` or `reference`.
@@ -166,6 +176,15 @@ impl fmt::Display for Refusal {
                 write!(f, "the feedback lane's probe gives other bits on this machine: do not fly, report it")
             }
             Self::Probe { index } => write!(f, "probe {index} gives other bits on this machine: do not fly, report it"),
+            Self::Bounds { output } => {
+                write!(f, "a probe breaks the bounds that the file states of output {output}: export the model again")
+            }
+            Self::Limit { output } => {
+                write!(
+                    f,
+                    "whatever comes in, the network's output {output} lies beyond its limit and would only be clamped: raise the limit, or make it 0 to switch the output off"
+                )
+            }
             Self::Signal { signal, channel } => {
                 write!(
                     f,

@@ -1,6 +1,6 @@
 //! Checks of a decoded card: every index exists, every number makes sense, every probe gives its bits.
 
-use super::{Blob, Card, LaneLayout, MAX_LAGS, MAX_WIDTH, Refusal};
+use super::{Blob, Bounds, Card, Floats, LaneLayout, MAX_LAGS, MAX_WIDTH, Refusal};
 use crate::{
     features::{Relative, Source},
     feedback::{self, Lane},
@@ -152,18 +152,21 @@ fn lane(card: &Card<'_>, lane: &LaneLayout) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Re-runs the probes: the bits must be the file's.
-pub(super) fn probes(
-    card: &Card<'_>,
-    blob: &Blob<'_>,
-    network: Option<&Network<'_>>,
+/// Smallest and largest value of each feature.
+type Envelope<'a> = (Floats<'a>, Floats<'a>);
+
+/// Re-runs the probes: the bits must be the file's, and within its bounds.
+pub(super) fn probes<'a>(
+    card: &Card<'a>,
+    blob: &Blob<'a>,
+    network: Option<(&Network<'a>, &Envelope<'a>, &Bounds<'a>)>,
     lane: Option<&Lane<'_>>,
 ) -> Result<(), Refusal> {
     let (inputs, outputs) = (card.features.len(), card.outputs.len());
     let count = usize::from(card.probes.count);
     let stored = blob.floats(card.probes.network, count * (inputs + outputs), "network probes")?;
     let (probe_inputs, probe_outputs) = stored.split_at(count * inputs);
-    if let Some(network) = network {
+    if let Some((network, envelope, bounds)) = network {
         let mut scratch = Scratch::new();
         let (mut x, mut y) = ([0.0; super::MAX_FEATURES], [0.0; super::MAX_OUTPUTS]);
         for probe in 0..count {
@@ -176,6 +179,7 @@ pub(super) fn probes(
             if !same {
                 return Err(Refusal::Probe { index: probe as u8 });
             }
+            bounds.check(&x, &y, envelope)?;
         }
     }
     if let Some(lane) = lane {

@@ -1,82 +1,77 @@
 //! Dense layers in f32.
 
-use super::{Activation, ROWS, padded};
-use crate::{
-    math,
-    model::{Blob, Floats, LayerLayout, MAX_OUTPUTS, MAX_WIDTH, Refusal, Section},
-};
+use super::{Activation, ROWS, kernel, padded, tanh::tanh};
+use crate::model::{Blob, LayerLayout, MAX_OUTPUTS, Refusal, Section, Words};
+
+/// Inputs are padded to a multiple of this.
+const PADDING: usize = 2;
 
 /// One checked layer.
 #[derive(Debug)]
 pub(super) struct Layer<'a> {
-    inputs: usize,
-    weights: Floats<'a>,
-    bias: Floats<'a>,
+    stream: Words<'a>,
+    inputs: u16,
+    outputs: u16,
     activation: Activation,
 }
 
 impl<'a> Layer<'a> {
     pub(super) fn new(blob: &Blob<'a>, layout: &LayerLayout) -> Result<Self, Refusal> {
-        let (inputs, rows) = (usize::from(layout.inputs), padded(layout.outputs.into()));
-        Ok(Self {
-            inputs,
-            weights: blob.floats(layout.weights, inputs * rows, "layer weights")?,
-            bias: blob.floats(layout.bias, rows, "layer bias")?,
-            activation: layout.activation,
-        })
+        let (inputs, outputs) = (layout.inputs.into(), layout.outputs.into());
+        Self::checked(blob, layout.rows, [inputs, outputs], layout.activation, "layer rows")
     }
 
-    /// The linear skip: weights only.
+    /// The linear skip.
     pub(super) fn skip(blob: &Blob<'a>, section: Section, inputs: usize, outputs: usize) -> Result<Self, Refusal> {
-        let weights = blob.floats(section, inputs * padded(outputs), "skip weights")?;
-        Ok(Self { inputs, weights, bias: Floats::default(), activation: Activation::Linear })
+        Self::checked(blob, section, [inputs, outputs], Activation::Linear, "skip rows")
     }
 
-    /// Adds weights × inputs to `sums`, a block of rows at a time.
-    pub(super) fn accumulate(&self, inputs: &[f32], sums: &mut [f32]) {
-        let mut weights = self.weights;
-        for block in sums.as_chunks_mut::<ROWS>().0 {
-            let (these, rest) = weights.split_at(ROWS * self.inputs);
-            weights = rest;
-            let mut accumulators = *block;
-            for (row, &input) in these.blocks::<ROWS>().zip(inputs) {
-                for (accumulator, weight) in accumulators.iter_mut().zip(row) {
-                    *accumulator += weight * input;
-                }
-            }
-            *block = accumulators;
+    fn checked(
+        blob: &Blob<'a>,
+        section: Section,
+        [inputs, outputs]: [usize; 2],
+        activation: Activation,
+        what: &'static str,
+    ) -> Result<Self, Refusal> {
+        let (inputs, outputs) = (inputs.next_multiple_of(PADDING), padded(outputs));
+        blob.floats(section, outputs * (1 + inputs), what)?;
+        let stream = blob.words(section, outputs * (1 + inputs), what)?;
+        Ok(Self { stream, inputs: inputs as u16, outputs: outputs as u16, activation })
+    }
+
+    fn hidden(&self, inputs: &[u32], outputs: &mut [u32]) {
+        let (Some(inputs), Some(outputs)) = (inputs.get(..self.inputs.into()), outputs.get_mut(..self.outputs.into())) else {
+            return;
+        };
+        kernel::float(self.stream.all(), inputs, self.activation == Activation::Relu, outputs);
+        if self.activation == Activation::Tanh {
+            outputs.iter_mut().for_each(|word| *word = tanh(f32::from_bits(*word)).to_bits());
         }
     }
 
-    fn forward(&self, inputs: &[f32], outputs: &mut [f32]) {
-        for (output, bias) in outputs.iter_mut().zip(self.bias.iter()) {
-            *output = bias;
+    /// The outputs of the last layer, or of the skip.
+    pub(super) fn outputs(&self, inputs: &[u32]) -> [f32; MAX_OUTPUTS] {
+        let mut outputs = [0; ROWS];
+        if let Some(inputs) = inputs.get(..self.inputs.into()) {
+            kernel::float(self.stream.all(), inputs, false, &mut outputs);
         }
-        let rows = outputs.get_mut(..self.bias.len()).unwrap_or_default();
-        self.accumulate(inputs, rows);
-        match self.activation {
-            Activation::Linear => {}
-            Activation::Relu => rows.iter_mut().for_each(|value| *value = if *value > 0.0 { *value } else { 0.0 }),
-            Activation::Tanh => rows.iter_mut().for_each(|value| *value = math::tanh(*value)),
-        }
+        outputs.map(f32::from_bits)
     }
 }
 
-/// Runs the layers from `inputs` to `result`.
-pub(super) fn evaluate(
+/// Runs the layers on the inputs in `current`; adds to `result`.
+pub(super) fn evaluate<'s>(
     layers: &[Layer<'_>],
-    inputs: &[f32],
-    buffers: &mut [[f32; MAX_WIDTH]; 2],
+    mut current: &'s mut [u32],
+    mut other: &'s mut [u32],
     result: &mut [f32; MAX_OUTPUTS],
 ) {
     let Some((last, hidden)) = layers.split_last() else { return };
-    let [mut current, mut other] = buffers.each_mut();
-    for (value, input) in current.iter_mut().zip(inputs) {
-        *value = *input;
-    }
     for layer in hidden {
-        layer.forward(current, other);
+        layer.hidden(current, other);
         core::mem::swap(&mut current, &mut other);
     }
-    last.forward(current, result);
+    for (result, output) in result.iter_mut().zip(last.outputs(current)) {
+        *result += output;
+    }
 }

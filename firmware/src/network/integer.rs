@@ -1,145 +1,186 @@
-//! Dense layers with int8 weights, 16-bit activations and 32-bit accumulators.
+//! Dense layers with int8 or int16 weights, codes of at most 16 bits and 32-bit accumulators.
 //!
-//! A row's accumulator is Σ weight × code + bias; validation proves that it cannot overflow. A hidden layer turns it into
-//! the next layer's code with one rounded multiplication, (accumulator × multiplier + 2³¹) / 2³², what SMMULR does on an Armv7E-M.
+//! A row's accumulator is Σ weight × code + bias, the weights in the units of [`super::kernel`]. A code never exceeds the limit that the
+//! card gives for the layer's inputs, and validation proves for every row that then no accumulator leaves 32 bits. A hidden layer turns
+//! it into a code with one rounded multiplication, (accumulator × multiplier + 2³¹) / 2³²; the last one into f32 with a scale.
 
-use super::{Activation, CODE_LIMIT, ROWS, padded, tanh::tanh_code};
-use crate::{
-    math::round_to_i32,
-    model::{Blob, Floats, Integers, LayerLayout, MAX_OUTPUTS, MAX_WIDTH, Refusal},
+use super::{
+    Activation, INPUT_PADDING, ROWS,
+    kernel::{self, Finish, Width, portable},
+    padded,
+    tanh::{code_factor, scaled_tanh},
 };
-
-#[derive(Debug)]
-enum Requantisation<'a> {
-    /// To the next layer's codes.
-    Codes(Integers<'a>),
-    /// To f32, one scale a row.
-    Floats(Floats<'a>),
-}
+use crate::model::{Blob, LayerLayout, MAX_OUTPUTS, Refusal, Words};
 
 /// One checked layer.
 #[derive(Debug)]
 pub(super) struct Layer<'a> {
-    inputs: usize,
-    /// Packed rows: `[block][input][row in block]`.
-    weights: &'a [[u8; ROWS]],
-    bias: Integers<'a>,
-    requantisation: Requantisation<'a>,
+    width: Width,
+    stream: Words<'a>,
+    /// Words of a row's inputs.
+    inputs: u16,
+    /// Words of its outputs, as codes.
+    outputs: u16,
     activation: Activation,
+    /// Largest code of its inputs and of its outputs.
+    limits: [u16; 2],
 }
 
 impl<'a> Layer<'a> {
-    pub(super) fn new(blob: &Blob<'a>, layout: &LayerLayout, index: u8, last: bool) -> Result<Self, Refusal> {
-        let (inputs, rows) = (usize::from(layout.inputs), padded(layout.outputs.into()));
-        let requantisation = if last {
-            Requantisation::Floats(blob.floats(layout.requantisation, rows, "layer row scales")?)
-        } else {
-            Requantisation::Codes(blob.integers(layout.requantisation, rows, "layer multipliers")?)
-        };
+    /// Checks layer `index`; `before` is the activation that gives its inputs, `next_limit` the limit of the codes that it gives.
+    pub(super) fn new(
+        blob: &Blob<'a>,
+        width: Width,
+        layout: &LayerLayout,
+        index: u8,
+        before: Activation,
+        next: Option<&LayerLayout>,
+    ) -> Result<Self, Refusal> {
+        let limit = layout.input_limit;
+        if limit == 0 || limit > i16::MAX as u16 {
+            return Err(Refusal::Value { what: "largest input code" });
+        }
+        let inputs = usize::from(layout.inputs).next_multiple_of(INPUT_PADDING) / 2;
+        let rows = padded(layout.outputs.into());
         let layer = Self {
-            inputs,
-            weights: blob.bytes(layout.weights, inputs * rows, "layer weights")?.as_chunks().0,
-            bias: blob.integers(layout.bias, rows, "layer bias")?,
-            requantisation,
+            width,
+            stream: blob.words(layout.rows, rows / ROWS * width.block(inputs), "layer rows")?,
+            inputs: inputs as u16,
+            outputs: (rows / 2) as u16,
             activation: layout.activation,
+            limits: [limit, next.map_or(0, |next| next.input_limit)],
         };
-        layer.refuse_overflow(index)?;
+        layer.refuse_overflow(index, before)?;
+        if next.is_none()
+            && !layer.blocks().all(|(_, _, scales)| scales.iter().all(|scale| f32::from_le_bytes(*scale).is_finite()))
+        {
+            return Err(Refusal::NotFinite { what: "layer row scales" });
+        }
         Ok(layer)
     }
 
+    /// Biases, weights and requantisation of each block of rows.
+    fn blocks(&self) -> impl Iterator<Item = (&'a [[u8; 4]; ROWS], &'a [[u8; 4]], &'a [[u8; 4]; ROWS])> + use<'a> {
+        self.stream.chunks(self.width.block(self.inputs.into())).filter_map(|block| {
+            let (bias, rest) = block.split_first_chunk()?;
+            let (weights, requantisation) = rest.split_last_chunk()?;
+            Some((bias, weights, requantisation))
+        })
+    }
+
     /// No accumulator may leave 32 bits for any codes.
-    fn refuse_overflow(&self, index: u8) -> Result<(), Refusal> {
-        for (block, bias) in self.weights.chunks(self.inputs.max(1)).zip(self.bias.blocks::<ROWS>()) {
-            let mut largest = bias.map(|bias| i64::from(bias).abs());
-            for row in block {
-                for (sum, weight) in largest.iter_mut().zip(row) {
-                    *sum += i64::from((*weight as i8).unsigned_abs()) * i64::from(CODE_LIMIT);
+    fn refuse_overflow(&self, index: u8, before: Activation) -> Result<(), Refusal> {
+        let limit = i64::from(self.limits[0]);
+        for (bias, weights, _) in self.blocks() {
+            let bias = bias.map(|bias| i64::from(i32::from_le_bytes(bias)));
+            // Sums of the positive and of the negative weights.
+            let (mut positive, mut negative) = ([0i64; ROWS], [0i64; ROWS]);
+            for words in weights.chunks_exact(self.width.words()) {
+                for (place, word) in words.iter().enumerate() {
+                    let word = u32::from_le_bytes(*word);
+                    let rows = match self.width {
+                        Width::Int8 => portable::byte_rows(word),
+                        Width::Int16 => [portable::halves(word), [0; 2]],
+                    };
+                    for (row, weight) in rows.iter().enumerate().flat_map(|(row, weights)| weights.map(|weight| (row, weight))) {
+                        let row = place * ROWS / self.width.words() + row;
+                        let (Some(positive), Some(negative)) = (positive.get_mut(row), negative.get_mut(row)) else { continue };
+                        *positive += i64::from(weight.max(0));
+                        *negative += i64::from(weight.min(0));
+                    }
                 }
             }
-            if largest.iter().any(|sum| *sum > i64::from(i32::MAX)) {
-                return Err(Refusal::Overflow { layer: index });
+            for ((bias, positive), negative) in bias.into_iter().zip(positive).zip(negative) {
+                let (high, low) = match before {
+                    Activation::Relu => (bias + positive * limit, bias + negative * limit),
+                    Activation::Tanh | Activation::Linear => {
+                        (bias + (positive - negative) * limit, bias - (positive - negative) * limit)
+                    }
+                };
+                if high > i64::from(i32::MAX) || low < i64::from(i32::MIN) {
+                    return Err(Refusal::Overflow { layer: index });
+                }
             }
         }
         Ok(())
     }
 
-    /// Accumulators of each block of rows.
-    fn accumulators<'l>(&'l self, codes: &'l [i16]) -> impl Iterator<Item = [i32; ROWS]> + 'l {
-        self.weights.chunks(self.inputs.max(1)).zip(self.bias.blocks::<ROWS>()).map(move |(block, bias)| {
-            let mut sums = bias;
-            for (row, &code) in block.iter().zip(codes) {
-                for (sum, weight) in sums.iter_mut().zip(row) {
-                    *sum = sum.wrapping_add(i32::from(*weight as i8).wrapping_mul(i32::from(code)));
-                }
+    fn hidden(&self, codes: &[u32], outputs: &mut [u32]) {
+        let limit = self.limits[1];
+        let (Some(codes), Some(outputs)) = (codes.get(..self.inputs.into()), outputs.get_mut(..self.outputs.into())) else {
+            return;
+        };
+        let finish = match self.activation {
+            Activation::Relu => Finish::Codes { limit },
+            Activation::Tanh | Activation::Linear => Finish::Preactivations,
+        };
+        kernel::integer(self.width, self.stream.all(), codes, finish, outputs);
+        match self.activation {
+            Activation::Relu => {}
+            Activation::Tanh => {
+                let factor = code_factor(limit);
+                each_code(outputs, |code| scaled_tanh(code, factor));
             }
-            sums
-        })
-    }
-
-    fn hidden(&self, codes: &[i16], outputs: &mut [i16]) {
-        let Requantisation::Codes(multipliers) = self.requantisation else { return };
-        let blocks = outputs.as_chunks_mut::<ROWS>().0.iter_mut().zip(multipliers.blocks::<ROWS>());
-        for ((outputs, multipliers), sums) in blocks.zip(self.accumulators(codes)) {
-            for ((output, multiplier), sum) in outputs.iter_mut().zip(multipliers).zip(sums) {
-                let code = requantise(sum, multiplier);
-                *output = match self.activation {
-                    Activation::Linear => code,
-                    Activation::Relu => code.max(0),
-                    Activation::Tanh => tanh_code(code),
-                };
+            Activation::Linear => {
+                let limit = limit as i16;
+                each_code(outputs, |code| {
+                    if code > limit {
+                        limit
+                    } else if code < -limit {
+                        -limit
+                    } else {
+                        code
+                    }
+                });
             }
         }
     }
 
-    fn output(&self, codes: &[i16], result: &mut [f32; MAX_OUTPUTS]) {
-        let Requantisation::Floats(scales) = self.requantisation else { return };
-        let sums = self.accumulators(codes).flatten();
-        for ((value, sum), scale) in result.iter_mut().zip(sums).zip(scales.iter()) {
-            *value = sum as f32 * scale;
+    fn last(&self, codes: &[u32], result: &mut [f32; MAX_OUTPUTS]) {
+        let mut sums = [0; MAX_OUTPUTS];
+        let Some(codes) = codes.get(..self.inputs.into()) else { return };
+        kernel::integer(self.width, self.stream.all(), codes, Finish::Sums, &mut sums);
+        let Some(scales) = self.stream.all().last_chunk::<ROWS>() else { return };
+        for ((value, sum), scale) in result.iter_mut().zip(sums).zip(scales) {
+            *value += sum as i32 as f32 * f32::from_le_bytes(*scale);
         }
     }
 }
 
-/// Rounded high word of accumulator × multiplier, saturated to a code.
 #[inline(always)]
-pub fn requantise(accumulator: i32, multiplier: i32) -> i16 {
-    let product = i64::from(accumulator) * i64::from(multiplier);
-    let rounded = (product.wrapping_add(1 << 31) >> 32) as i32;
-    rounded.clamp(-CODE_LIMIT, CODE_LIMIT) as i16
+fn each_code(words: &mut [u32], map: impl Fn(i16) -> i16) {
+    for word in words {
+        let [low, high] = portable::halves(*word);
+        *word = portable::pair(map(low), map(high));
+    }
 }
 
-/// Runs the layers from normalised `inputs` to `result`.
-pub(super) fn evaluate(
+/// 1.5 × 2²³: in the f32 above it the last bit is worth 1.
+const ROUNDING: f32 = 12_582_912.0;
+
+/// The nearest integer, halves to the even one, within ±`limit`. Not a number gives either limit.
+#[inline(always)]
+pub(super) fn code(value: f32, limit: i32) -> i16 {
+    let integer = ((value + ROUNDING).to_bits() as i32).saturating_sub(ROUNDING.to_bits() as i32);
+    integer.clamp(-limit, limit) as i16
+}
+
+/// The first layer's largest code.
+pub(super) fn input_limit(layers: &[Layer<'_>]) -> i32 {
+    layers.first().map_or(0, |layer| i32::from(layer.limits[0]))
+}
+
+/// Runs the layers on the input codes in `current`; adds to `result`.
+pub(super) fn evaluate<'s>(
     layers: &[Layer<'_>],
-    inputs: &[f32],
-    code: f32,
-    buffers: &mut [[i16; MAX_WIDTH]; 2],
+    mut current: &'s mut [u32],
+    mut other: &'s mut [u32],
     result: &mut [f32; MAX_OUTPUTS],
 ) {
     let Some((last, hidden)) = layers.split_last() else { return };
-    let [mut current, mut other] = buffers.each_mut();
-    for (value, input) in current.iter_mut().zip(inputs) {
-        *value = round_to_i32(*input * code, CODE_LIMIT) as i16;
-    }
     for layer in hidden {
         layer.hidden(current, other);
         core::mem::swap(&mut current, &mut other);
     }
-    last.output(current, result);
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn requantisation_is_a_rounded_product(accumulator in any::<i32>(), multiplier in any::<i32>()) {
-            let exact = f64::from(accumulator) * f64::from(multiplier) / 4_294_967_296.0;
-            let found = f64::from(requantise(accumulator, multiplier));
-            let limit = f64::from(CODE_LIMIT);
-            prop_assert!((found - exact.clamp(-limit, limit)).abs() <= 0.500_001);
-        }
-    }
+    last.last(current, result);
 }

@@ -1,27 +1,38 @@
 //! Fixed-size feed-forward network: normalise, dense layers plus a linear skip, denormalise.
 //!
 //! *in* features in physical units; *out* corrections in physical units; *never* allocates, panics or gives other bits on another
-//! machine; *source* Zhou 2017, section IV-A (dense layers); the linear skip from inputs to outputs is ours.
+//! machine, or takes longer for other inputs; *source* Zhou 2017, section IV-A (dense layers); the linear skip from inputs to outputs is
+//! ours.
 //!
-//! Packed order of every weight matrix, f32 and int8: blocks of [`ROWS`] outputs; within a block, for each input in turn,
-//! the weights of the block's outputs side by side. The last block is padded with zero rows, and so are bias and requantisation.
-//! A sum is therefore taken over the inputs in order, for eight outputs at once.
+//! # The map
+//! With n = (x − mean) · (1 / scale) in f32, and d(·) the dense layers,
+//! output = (skip(n) + d(n)) · output scale + output mean. Float layers follow the order of operations in [`kernel`]. Integer layers:
+//! 1. the inputs' codes are n · `input_code`, rounded to the nearest integer (halves to even), within ± the first layer's
+//!    [`input_limit`](crate::model::LayerLayout::input_limit);
+//! 2. a hidden layer's accumulator a, exact in 32 bits, becomes c = ⌊a · multiplier / 2³² + ½⌋. ReLU: c within 0..=L, L being the next
+//!    layer's limit. Linear: c within ±L. Tanh: c within 16 bits is a pre-activation in units of 1/[`TANH_INPUT_ONE`], [`tanh_code`]
+//!    makes a code of it, of which L is 1;
+//! 3. the last layer's accumulators, as f32, times the scales of their rows.
 
 mod float;
 mod integer;
+pub mod kernel;
+mod scratch;
 mod tanh;
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::{Arithmetic, Blob, Floats, MAX_FEATURES, MAX_OUTPUTS, MAX_WIDTH, NetworkLayout, Refusal};
+use crate::model::{Arithmetic, Blob, Floats, MAX_FEATURES, MAX_LAYERS, MAX_OUTPUTS, NetworkLayout, Refusal};
 
-pub use integer::requantise;
-pub use tanh::{TANH_INPUT_ONE, tanh_code};
+pub use kernel::portable::requantise;
+pub use scratch::{MAX_SCRATCH, Scratch};
+pub use tanh::{TANH_CODE_ERROR, TANH_ERROR, TANH_INPUT_ONE, tanh, tanh_code};
 
 /// Outputs that are computed side by side.
 pub const ROWS: usize = 8;
-/// Largest magnitude of a 16-bit activation code.
-pub const CODE_LIMIT: i32 = 32_767;
+const _: () = assert!(MAX_OUTPUTS == ROWS);
+/// Inputs of an integer layer are padded to a multiple of this; of a float layer to a multiple of 2.
+pub const INPUT_PADDING: usize = 4;
 
 /// Non-linearity behind a dense layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -34,31 +45,10 @@ pub enum Activation {
     Tanh,
 }
 
-/// Working memory of one evaluation.
-#[derive(Clone, Debug)]
-pub struct Scratch {
-    normalised: [f32; MAX_FEATURES],
-    floats: [[f32; MAX_WIDTH]; 2],
-    codes: [[i16; MAX_WIDTH]; 2],
-}
-
-impl Scratch {
-    /// Zeroed memory.
-    pub const fn new() -> Self {
-        Self { normalised: [0.0; MAX_FEATURES], floats: [[0.0; MAX_WIDTH]; 2], codes: [[0; MAX_WIDTH]; 2] }
-    }
-}
-
-impl Default for Scratch {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 #[derive(Debug)]
 enum Layers<'a> {
-    Float(heapless::Vec<float::Layer<'a>, { crate::model::MAX_LAYERS }>),
-    Integer { code: f32, layers: heapless::Vec<integer::Layer<'a>, { crate::model::MAX_LAYERS }> },
+    Float(heapless::Vec<float::Layer<'a>, MAX_LAYERS>),
+    Integer { code: f32, layers: heapless::Vec<integer::Layer<'a>, MAX_LAYERS> },
 }
 
 /// A network whose shapes and sections have been checked.
@@ -71,6 +61,8 @@ pub struct Network<'a> {
     output_scale: Floats<'a>,
     output_mean: Floats<'a>,
     multiply_adds: u32,
+    /// Words of the widest activations.
+    half: usize,
 }
 
 impl<'a> Network<'a> {
@@ -83,32 +75,13 @@ impl<'a> Network<'a> {
             blob.floats(layout.input_normalisation, 2 * inputs, "input normalisation")?.split_at(inputs);
         let (output_scale, output_mean) =
             blob.floats(layout.output_normalisation, 2 * outputs, "output normalisation")?.split_at(outputs);
-        let mut width = inputs;
-        let mut multiply_adds = 0;
-        for (index, layer) in layout.layers.iter().enumerate() {
-            if usize::from(layer.inputs) != width {
-                return Err(Refusal::Shape { what: "layer inputs", found: layer.inputs.into(), limit: width as u32 });
-            }
-            multiply_adds += u32::from(layer.inputs) * u32::from(layer.outputs);
-            width = usize::from(layer.outputs);
-            let last = index + 1 == layout.layers.len();
-            if last && (width != outputs || layer.activation != Activation::Linear) {
-                return Err(Refusal::Shape {
-                    what: "outputs of the last (linear) layer",
-                    found: width as u32,
-                    limit: outputs as u32,
-                });
-            }
-        }
+        let mut multiply_adds = chained(layout, inputs, outputs)?;
         let skip = if layout.skip.length > 0 {
             multiply_adds += (inputs * outputs) as u32;
             Some(float::Layer::skip(blob, layout.skip, inputs, outputs)?)
         } else if layout.layers.is_empty() {
-            return Err(Refusal::Shape {
-                what: "number of layers without a skip",
-                found: 0,
-                limit: crate::model::MAX_LAYERS as u32,
-            });
+            let what = "number of layers without a skip";
+            return Err(Refusal::Shape { what, found: 0, limit: MAX_LAYERS as u32 });
         } else {
             None
         };
@@ -120,22 +93,11 @@ impl<'a> Network<'a> {
                 }
                 Layers::Float(layers)
             }
-            Arithmetic::Int8 => {
-                if !layout.input_code.is_finite() {
-                    return Err(Refusal::NotFinite { what: "input code" });
-                }
-                if layout.input_code <= 0.0 {
-                    return Err(Refusal::Value { what: "input code" });
-                }
-                let mut layers = heapless::Vec::new();
-                for (index, layer) in layout.layers.iter().enumerate() {
-                    let last = index + 1 == layout.layers.len();
-                    let _ = layers.push(integer::Layer::new(blob, layer, index as u8, last)?);
-                }
-                Layers::Integer { code: layout.input_code, layers }
-            }
+            Arithmetic::Int16 => integer_layers(layout, blob, kernel::Width::Int16)?,
+            Arithmetic::Int8 => integer_layers(layout, blob, kernel::Width::Int8)?,
         };
-        Ok(Self { mean, reciprocal_scale, layers, skip, output_scale, output_mean, multiply_adds })
+        let half = scratch::half(layout, inputs);
+        Ok(Self { mean, reciprocal_scale, layers, skip, output_scale, output_mean, multiply_adds, half })
     }
 
     /// Multiplications with a weight in one evaluation.
@@ -143,32 +105,113 @@ impl<'a> Network<'a> {
         self.multiply_adds
     }
 
+    /// Words of [`Scratch`] that an evaluation needs.
+    pub fn scratch_words(&self) -> usize {
+        2 * self.half
+    }
+
     /// Evaluates the network: `inputs` in physical units, one for each feature; `outputs` in the units of the corrected channels.
-    pub fn evaluate(&self, inputs: &[f32], outputs: &mut [f32], scratch: &mut Scratch) {
-        let count = self.mean.len();
-        let normalised = scratch.normalised.get_mut(..count).unwrap_or_default();
-        let normalisation = self.mean.iter().zip(self.reciprocal_scale.iter());
-        for ((value, input), (mean, reciprocal)) in normalised.iter_mut().zip(inputs).zip(normalisation) {
-            *value = (*input - mean) * reciprocal;
-        }
+    /// A scratch of fewer words than [`Network::scratch_words`], or fewer inputs than features, leave `outputs` as they are.
+    #[inline]
+    pub fn evaluate<const WORDS: usize>(&self, inputs: &[f32], outputs: &mut [f32], scratch: &mut Scratch<WORDS>) {
+        self.run(inputs, outputs, scratch.words());
+    }
+
+    #[inline(never)]
+    fn run(&self, inputs: &[f32], outputs: &mut [f32], scratch: &mut [u32]) {
+        let (Some((front, rest)), Some(inputs)) = (scratch.split_at_mut_checked(self.half), inputs.get(..self.mean.len())) else {
+            return;
+        };
+        let Some(back) = rest.get_mut(..self.half) else { return };
         let mut result = [0.0; MAX_OUTPUTS];
         match &self.layers {
-            Layers::Float(layers) => float::evaluate(layers, normalised, &mut scratch.floats, &mut result),
-            Layers::Integer { code, layers } => {
-                integer::evaluate(layers, normalised, *code, &mut scratch.codes, &mut result);
+            Layers::Float(layers) => {
+                self.normalise(inputs, front, |_, _| ());
+                if let Some(skip) = &self.skip {
+                    result = skip.outputs(front);
+                }
+                float::evaluate(layers, front, back, &mut result);
             }
-        }
-        if let Some(skip) = &self.skip {
-            skip.accumulate(normalised, &mut result);
+            Layers::Integer { code, layers } => {
+                let limit = integer::input_limit(layers);
+                let normalised = if self.skip.is_some() { &mut *back } else { &mut [] };
+                self.normalise(inputs, normalised, |index, value| {
+                    let code = integer::code(value * code, limit);
+                    if let Some(word) = front.get_mut(index / 2) {
+                        let other = kernel::portable::halves(*word)[0];
+                        *word =
+                            if index % 2 == 0 { kernel::portable::pair(code, 0) } else { kernel::portable::pair(other, code) };
+                    }
+                });
+                let words = inputs.len().div_ceil(2);
+                if let Some(padding) = front.get_mut(words..words.next_multiple_of(INPUT_PADDING / 2)) {
+                    padding.fill(0);
+                }
+                if let Some(skip) = &self.skip {
+                    result = skip.outputs(back);
+                }
+                integer::evaluate(layers, front, back, &mut result);
+            }
         }
         let denormalisation = self.output_scale.iter().zip(self.output_mean.iter());
         for ((output, value), (scale, mean)) in outputs.iter_mut().zip(result).zip(denormalisation) {
             *output = value * scale + mean;
         }
     }
+
+    /// Normalises the inputs into `words` (padded with zero to an even number), if there is room, and shows each to `also`.
+    #[inline(always)]
+    fn normalise(&self, inputs: &[f32], words: &mut [u32], mut also: impl FnMut(usize, f32)) {
+        let normalisation = self.mean.iter().zip(self.reciprocal_scale.iter());
+        for (index, (input, (mean, reciprocal))) in inputs.iter().zip(normalisation).enumerate() {
+            let value = (*input - mean) * reciprocal;
+            if let Some(word) = words.get_mut(index) {
+                *word = value.to_bits();
+            }
+            also(index, value);
+        }
+        if let Some(word) = words.get_mut(inputs.len()) {
+            *word = 0;
+        }
+    }
 }
 
-/// Rows of a packed matrix: outputs rounded up to whole blocks.
+/// Checks that the layers' shapes follow from each other; gives their number of multiplications.
+fn chained(layout: &NetworkLayout, inputs: usize, outputs: usize) -> Result<u32, Refusal> {
+    let (mut width, mut multiply_adds) = (inputs, 0);
+    for (index, layer) in layout.layers.iter().enumerate() {
+        if usize::from(layer.inputs) != width {
+            return Err(Refusal::Shape { what: "layer inputs", found: layer.inputs.into(), limit: width as u32 });
+        }
+        multiply_adds += u32::from(layer.inputs) * u32::from(layer.outputs);
+        width = usize::from(layer.outputs);
+        let last = index + 1 == layout.layers.len();
+        if last && (width != outputs || layer.activation != Activation::Linear) {
+            let what = "outputs of the last (linear) layer";
+            return Err(Refusal::Shape { what, found: width as u32, limit: outputs as u32 });
+        }
+    }
+    Ok(multiply_adds)
+}
+
+fn integer_layers<'a>(layout: &NetworkLayout, blob: &Blob<'a>, width: kernel::Width) -> Result<Layers<'a>, Refusal> {
+    if !layout.input_code.is_finite() {
+        return Err(Refusal::NotFinite { what: "input code" });
+    }
+    if layout.input_code <= 0.0 {
+        return Err(Refusal::Value { what: "input code" });
+    }
+    let mut layers = heapless::Vec::new();
+    let mut before = Activation::Linear;
+    for (index, layer) in layout.layers.iter().enumerate() {
+        let next = layout.layers.get(index + 1);
+        let _ = layers.push(integer::Layer::new(blob, width, layer, index as u8, before, next)?);
+        before = layer.activation;
+    }
+    Ok(Layers::Integer { code: layout.input_code, layers })
+}
+
+/// Rows of a packed layer: outputs rounded up to whole blocks.
 pub fn padded(outputs: usize) -> usize {
     outputs.next_multiple_of(ROWS)
 }

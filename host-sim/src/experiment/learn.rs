@@ -1,7 +1,7 @@
 //! From logs to networks: ridge regression, the network that refines it, the same fine-tuned for int8.
 
 use impromptu_firmware::quadrotor::REFERENCE;
-use impromptu_model_export::FloatNetwork;
+use impromptu_model_export::{Batch, FloatNetwork};
 
 use super::{
     breakdown::{Breakdown, sound},
@@ -124,12 +124,12 @@ pub fn learn(
 /// The candidate with the least squared error on rows that it has not seen, each output by its own scale.
 fn best_on_rows(candidates: &[FloatNetwork], data: &Dataset) -> usize {
     let loss = |network: &FloatNetwork| -> f64 {
-        let rows = data.inputs().iter().zip(data.labels().iter());
-        rows.map(|(input, label)| {
-            let errors = network.evaluate(input).into_iter().zip(label).zip(&network.output_scale);
-            errors.map(|((found, label), scale)| f64::from((found - label) / scale).powi(2)).sum::<f64>()
-        })
-        .sum()
+        let mut sum = 0.0;
+        Batch::of_network(network).evaluate(data.inputs().iter(), |row, found| {
+            let errors = found.iter().zip(data.labels().row(row)).zip(&network.output_scale);
+            sum += errors.map(|((found, label), scale)| f64::from((found - label) / scale).powi(2)).sum::<f64>();
+        });
+        sum
     };
     let losses = candidates.iter().map(loss).enumerate();
     losses.min_by(|(_, a), (_, b)| a.total_cmp(b)).map_or(0, |(index, _)| index)

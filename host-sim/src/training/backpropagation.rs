@@ -5,9 +5,9 @@
 //! output is overwritten by its gradient on the way back: nothing is allocated in a step.
 
 use super::elementwise::{AdamFactors, adam, apply_tanh, column_sums, sum_of_squares};
-use super::matrix_kernel::{Accumulate, Bias, Store, TimesReluDerivative, TimesTanhDerivative, product};
-use super::padded_matrix::PaddedMatrix;
 use super::quantisation::{round_activations, round_weights};
+use impromptu_model_export::batch::matrix_kernel::{Accumulate, Bias, Store, TimesReluDerivative, TimesTanhDerivative, product};
+use impromptu_model_export::batch::padded_matrix::PaddedMatrix;
 use impromptu_model_export::float_network::{Activation, DenseLayer};
 use pulp::Arch;
 

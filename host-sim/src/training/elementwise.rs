@@ -2,7 +2,7 @@
 //! into vector code. (Each closure moves what it writes to into itself: a closure that could be called twice is called through
 //! a shim, which is not inlined and would lose the vector instructions.) None of them adds up in an order that depends on the machine.
 
-use super::padded_matrix::{LANES, PaddedMatrix};
+use impromptu_model_export::batch::padded_matrix::{LANES, PaddedMatrix};
 use pulp::Arch;
 
 /// tanh of each value, within 3 units in the last place; f32 and branch-free so that it runs on whole vectors.

@@ -1,7 +1,7 @@
 //! The loss of a batch and its gradient.
 
-use super::padded_matrix::PaddedMatrix;
 use super::settings::Loss;
+use impromptu_model_export::batch::padded_matrix::PaddedMatrix;
 
 impl Loss {
     /// The loss of one error and its derivative.

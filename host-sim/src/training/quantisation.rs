@@ -4,7 +4,7 @@
 //! `w / scale` rounded half away from zero. Activations: a signed integer of n bits with one scale for each layer's input,
 //! `scale = largest value / (2^(n-1) - 1)`, rounded alike, clamped.
 
-use super::padded_matrix::PaddedMatrix;
+use impromptu_model_export::batch::padded_matrix::PaddedMatrix;
 use impromptu_model_export::float_network::FloatNetwork;
 use pulp::Arch;
 

@@ -1,7 +1,7 @@
 //! A data set as the layers see it: normalised, and with what a frozen skip already explains taken off.
 
 use super::dataset::Dataset;
-use super::padded_matrix::PaddedMatrix;
+use impromptu_model_export::batch::padded_matrix::PaddedMatrix;
 use impromptu_model_export::float_network::FloatNetwork;
 
 /// Normalised inputs, targets of the layers and relative row weights.

@@ -27,7 +27,7 @@ pub(super) struct Export {
     /// Description; NET.json beside the network if not given.
     #[arg(long, value_name = "NET.json")]
     description: Option<PathBuf>,
-    /// Rows of features to calibrate int8 on and to take probes from, a column for each feature in the description's order and units,
+    /// Rows of features to calibrate int8 or int16 on and to take probes from, a column for each feature in the description's order and units,
     /// below a header; NET.rows.csv beside the network if not given and there.
     #[arg(long, value_name = "ROWS.csv", requires = "network")]
     calibration: Option<PathBuf>,
@@ -49,8 +49,10 @@ pub(super) struct Export {
 enum PrecisionName {
     /// f32 weights and activations.
     Float,
-    /// int8 weights with a scale for each row, 16-bit activations.
+    /// int8 weights with a scale for each row, activations of up to 16 bits.
     Int8,
+    /// int16 weights with a scale for each row, activations of up to 16 bits.
+    Int16,
 }
 
 /// What was written.
@@ -94,6 +96,7 @@ impl Export {
         let precision = match self.precision {
             PrecisionName::Float => Precision::Float,
             PrecisionName::Int8 => Precision::Int8,
+            PrecisionName::Int16 => Precision::Int16,
         };
         let bytes = encode(&description, network.as_ref(), precision, &calibration)?;
         let model = Model::from_bytes(&bytes)?;

@@ -61,6 +61,9 @@ impl fmt::Display for Inspection {
             ),
         )?;
         writeln!(f, "\nOutputs\n{}", self.outputs_table())?;
+        if self.network.is_some() {
+            writeln!(f, "Network lane with features within their ranges in training: proven bounds\n{}", self.bounds_table())?;
+        }
         if let Some(lane) = &self.lane {
             writeln!(f, "Feedback lane\n{}", axes_table(lane))?;
         }
@@ -139,6 +142,21 @@ impl Inspection {
             [output.name.clone(), output.unit.clone(), output.limit.to_string(), format!("{} /s", output.slew_per_second)]
         });
         table(["reference", "unit", "limit", "slew"], rows)
+    }
+
+    fn bounds_table(&self) -> String {
+        let rows = self.outputs.iter().filter_map(|output| {
+            let bounds = output.bounds?;
+            Some([
+                output.name.clone(),
+                output.unit.clone(),
+                format!("{:.4} to {:.4}", bounds.low, bounds.high),
+                bounds.reaches_limit.into(),
+                format!("{:.3e}", bounds.difference),
+                format!("{:.4}", bounds.lipschitz),
+            ])
+        });
+        table(["reference", "unit", "range", "reaches its limit", "off the float network", "slope"], rows)
     }
 
     fn signals_table(&self) -> String {

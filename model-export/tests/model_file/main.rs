@@ -2,10 +2,13 @@
 
 mod fixture;
 
+mod batch;
+mod bounds;
 mod command_line;
 mod damage;
 mod description;
 mod golden;
+mod precision;
 mod refusals;
 mod round_trip;
 

@@ -21,7 +21,7 @@ impl Kernel for Engine {
     }
 
     fn working_memory(&self) -> usize {
-        size_of::<Scratch>()
+        4 * self.network.scratch_words()
     }
 
     fn evaluate(&mut self, inputs: &[f32], outputs: &mut [f32]) {

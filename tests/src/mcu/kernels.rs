@@ -18,6 +18,7 @@ pub struct Kernel {
 /// All kernels, ours first.
 pub const KERNELS: &[Kernel] = &[
     Kernel { name: "int8", form: Form::Model(Precision::Int8), number: OURS },
+    Kernel { name: "int16", form: Form::Model(Precision::Int16), number: OURS },
     Kernel { name: "f32", form: Form::Model(Precision::Float), number: OURS },
     Kernel { name: "plain_f32", form: Form::Float, number: 1 },
     Kernel { name: "embedded_nn", form: Form::Integer, number: 3 },

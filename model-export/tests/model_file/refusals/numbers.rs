@@ -12,21 +12,21 @@ fn numbers() {
         &[
             case!(
                 "weight",
-                |c, b| put(b, c.network.as_ref().unwrap().layers[0].weights, 3, f32::NAN.to_le_bytes()),
+                |c, b| put(b, c.network.as_ref().unwrap().layers[0].rows, 11, f32::NAN.to_le_bytes()),
                 Refusal::NotFinite { .. },
-                "layer weights holds"
+                "layer rows holds"
             ),
             case!(
                 "bias",
-                |c, b| put(b, c.network.as_ref().unwrap().layers[1].bias, 0, f32::INFINITY.to_le_bytes()),
+                |c, b| put(b, c.network.as_ref().unwrap().layers[1].rows, 0, f32::INFINITY.to_le_bytes()),
                 Refusal::NotFinite { .. },
-                "layer bias holds"
+                "layer rows holds"
             ),
             case!(
                 "skip",
                 |c, b| put(b, c.network.as_ref().unwrap().skip, 0, f32::NAN.to_le_bytes()),
                 Refusal::NotFinite { .. },
-                "skip weights holds"
+                "skip rows holds"
             ),
             case!(
                 "normalisation",
@@ -98,19 +98,19 @@ fn numbers() {
         &[
             case!(
                 "overflow",
-                |c, b| put(b, c.network.as_ref().unwrap().layers[0].bias, 0, i32::MAX.to_le_bytes()),
+                |c, b| put(b, c.network.as_ref().unwrap().layers[0].rows, 0, i32::MAX.to_le_bytes()),
                 Refusal::Overflow { layer: 0 },
                 "layer 0 could overflow"
             ),
             case!(
                 "overflow below",
-                |c, b| put(b, c.network.as_ref().unwrap().layers[1].bias, 1, i32::MIN.to_le_bytes()),
+                |c, b| put(b, c.network.as_ref().unwrap().layers[1].rows, 1, i32::MIN.to_le_bytes()),
                 Refusal::Overflow { layer: 1 },
                 "layer 1 could overflow"
             ),
             case!(
                 "row scale",
-                |c, b| put(b, c.network.as_ref().unwrap().layers[1].requantisation, 0, f32::NAN.to_le_bytes()),
+                |c, b| put(b, c.network.as_ref().unwrap().layers[1].rows, 8 + 16, f32::NAN.to_le_bytes()),
                 Refusal::NotFinite { .. },
                 "layer row scales holds"
             ),
@@ -119,6 +119,24 @@ fn numbers() {
                 |c, _b| c.network.as_mut().unwrap().input_code = f32::NAN,
                 Refusal::NotFinite { .. },
                 "input code holds"
+            ),
+            case!(
+                "larger codes than the proof allows",
+                |c, _b| c.network.as_mut().unwrap().layers[1].input_limit = 32_767,
+                Refusal::Overflow { layer: 1 },
+                "layer 1 could overflow"
+            ),
+            case!(
+                "no codes",
+                |c, _b| c.network.as_mut().unwrap().layers[0].input_limit = 0,
+                Refusal::Value { .. },
+                "largest input code"
+            ),
+            case!(
+                "codes beyond 16 bits",
+                |c, _b| c.network.as_mut().unwrap().layers[1].input_limit = 32_768,
+                Refusal::Value { .. },
+                "largest input code"
             ),
             case!("no input code", |c, _b| c.network.as_mut().unwrap().input_code = 0.0, Refusal::Value { .. }, "input code"),
         ],

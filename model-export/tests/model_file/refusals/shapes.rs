@@ -70,15 +70,15 @@ fn shapes_and_sections() {
             ),
             case!(
                 "length",
-                |c, _b| c.network.as_mut().unwrap().layers[0].weights.length -= 8,
-                Refusal::SectionLength { expected: 24, found: 16, .. },
-                "section layer weights has 16 bytes"
+                |c, _b| c.network.as_mut().unwrap().layers[0].rows.length -= 8,
+                Refusal::SectionLength { expected: 96, found: 88, .. },
+                "section layer rows has 88 bytes"
             ),
             case!(
-                "multipliers",
-                |c, _b| c.network.as_mut().unwrap().layers[0].requantisation.length = 0,
+                "skip length",
+                |c, _b| c.network.as_mut().unwrap().skip.length -= 4,
                 Refusal::SectionLength { .. },
-                "section layer multipliers"
+                "section skip rows"
             ),
             case!(
                 "lane length",
@@ -90,15 +90,15 @@ fn shapes_and_sections() {
             case!("probe count", |c, _b| c.probes.count = 5, Refusal::SectionLength { .. }, "section network probes"),
             case!(
                 "alignment",
-                |c, _b| c.network.as_mut().unwrap().layers[0].weights.offset += 4,
+                |c, _b| c.network.as_mut().unwrap().layers[0].rows.offset += 4,
                 Refusal::SectionAlignment { .. },
-                "section layer weights is not aligned"
+                "section layer rows is not aligned"
             ),
             case!(
                 "range",
                 |c, _b| c.network.as_mut().unwrap().skip.offset = 16 << 16,
                 Refusal::SectionRange { .. },
-                "section skip weights lies outside"
+                "section skip rows lies outside"
             ),
             case!(
                 "end of the address space",

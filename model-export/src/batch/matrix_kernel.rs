@@ -1,12 +1,12 @@
-//! Matrix products for training, in safe Rust on vector registers (the `pulp` crate picks AVX-512, AVX2 or scalar code at
+//! Matrix products for training and batch evaluation, in safe Rust on vector registers (the `pulp` crate picks AVX-512, AVX2 or scalar code at
 //! run time).
 //!
 //! A tile of 8 rows and 2 vectors of the result stays in registers while the products are summed up; operands are read in
 //! place (see [`PaddedMatrix`] for the stride that makes this fast), nothing is packed or transposed, and what comes before
 //! and after the sum (bias, activation, derivative) happens while the tile is in registers.
 //!
-//! Each element is one chain of fused multiply-adds in the order of the depth, so the result has the same bits whatever the
-//! width of the machine's registers.
+//! Each element is one chain of multiply-adds in the order of the depth, fused unless the edge says otherwise ([`Unfused`]), so the
+//! result has the same bits whatever the width of the machine's registers.
 
 use super::padded_matrix::PaddedMatrix;
 use pulp::{Arch, Simd, WithSimd};
@@ -17,7 +17,9 @@ const TILE_ROWS: usize = 8;
 const TILE_VECTORS: usize = 2;
 
 /// What happens to an element before and after its sum of products.
-pub(super) trait Edge: Copy {
+pub trait Edge: Copy {
+    /// Whether each multiplication and addition are rounded once, together.
+    const FUSED: bool = true;
     /// What the sum starts from, given the element's present value and its column.
     fn start<S: Simd>(self, simd: S, present: S::f32s, column: usize) -> S::f32s;
     /// What is stored, given the sum and the element's present value.
@@ -26,7 +28,7 @@ pub(super) trait Edge: Copy {
 
 /// The plain product.
 #[derive(Clone, Copy)]
-pub(super) struct Store;
+pub struct Store;
 
 impl Edge for Store {
     #[inline(always)]
@@ -41,7 +43,7 @@ impl Edge for Store {
 
 /// The product added to what is there.
 #[derive(Clone, Copy)]
-pub(super) struct Accumulate;
+pub struct Accumulate;
 
 impl Edge for Accumulate {
     #[inline(always)]
@@ -56,7 +58,7 @@ impl Edge for Accumulate {
 
 /// The product plus a bias for each column, rectified if asked for.
 #[derive(Clone, Copy)]
-pub(super) struct Bias<'a, const RECTIFY: bool>(pub(super) &'a [f32]);
+pub struct Bias<'a, const RECTIFY: bool>(pub &'a [f32]);
 
 impl<const RECTIFY: bool> Edge for Bias<'_, RECTIFY> {
     #[inline(always)]
@@ -69,9 +71,25 @@ impl<const RECTIFY: bool> Edge for Bias<'_, RECTIFY> {
     }
 }
 
+/// The same with each product rounded before it is added: the bits of a plain loop in f32.
+#[derive(Clone, Copy)]
+pub struct Unfused<E>(pub E);
+
+impl<E: Edge> Edge for Unfused<E> {
+    const FUSED: bool = false;
+    #[inline(always)]
+    fn start<S: Simd>(self, simd: S, present: S::f32s, column: usize) -> S::f32s {
+        self.0.start(simd, present, column)
+    }
+    #[inline(always)]
+    fn finish<S: Simd>(self, simd: S, sum: S::f32s, present: S::f32s) -> S::f32s {
+        self.0.finish(simd, sum, present)
+    }
+}
+
 /// The product times the derivative of ReLU; the result replaces the layer's output, from which the derivative is taken.
 #[derive(Clone, Copy)]
-pub(super) struct TimesReluDerivative;
+pub struct TimesReluDerivative;
 
 impl Edge for TimesReluDerivative {
     #[inline(always)]
@@ -87,7 +105,7 @@ impl Edge for TimesReluDerivative {
 
 /// The product times the derivative of tanh, 1 - h²; the result replaces the layer's output h.
 #[derive(Clone, Copy)]
-pub(super) struct TimesTanhDerivative;
+pub struct TimesTanhDerivative;
 
 impl Edge for TimesTanhDerivative {
     #[inline(always)]
@@ -102,7 +120,7 @@ impl Edge for TimesTanhDerivative {
 
 /// `c[..rows] = edge(a · b)` over the first `depth` columns of `a` and rows of `b`; with `LEFT_TRANSPOSED`, `a` is read as
 /// its transpose and `depth` counts its rows. `c` has the columns of `b`.
-pub(super) fn product<const LEFT_TRANSPOSED: bool>(
+pub fn product<const LEFT_TRANSPOSED: bool>(
     arch: Arch,
     (rows, depth): (usize, usize),
     a: &PaddedMatrix,
@@ -184,14 +202,14 @@ impl<E: Edge, const LEFT_TRANSPOSED: bool> Product<'_, E, LEFT_TRANSPOSED> {
         if LEFT_TRANSPOSED {
             for (row_of_a, row_of_b) in a.chunks_exact(self.a.stride).zip(rows_of_b) {
                 let left: &[f32; ROWS] = row_of_a[row..].first_chunk().expect("rows of the result lie within a");
-                multiply_add(simd, &mut sums, *left, vectors_of::<S, VECTORS>(&row_of_b[column..]));
+                multiply_add::<S, E, ROWS, VECTORS>(simd, &mut sums, *left, vectors_of::<S, VECTORS>(&row_of_b[column..]));
             }
         } else {
             // Slices of one known length: the compiler then drops the bounds checks on `step`.
             let lefts: [&[f32]; ROWS] = core::array::from_fn(|r| &a[(row + r) * self.a.stride..][..self.depth]);
             for (step, row_of_b) in rows_of_b.enumerate() {
                 let left = core::array::from_fn(|r| lefts[r][step]);
-                multiply_add(simd, &mut sums, left, vectors_of::<S, VECTORS>(&row_of_b[column..]));
+                multiply_add::<S, E, ROWS, VECTORS>(simd, &mut sums, left, vectors_of::<S, VECTORS>(&row_of_b[column..]));
             }
         }
         for (r, sums) in sums.iter().enumerate() {
@@ -209,7 +227,7 @@ fn vectors_of<S: Simd, const VECTORS: usize>(row: &[f32]) -> [S::f32s; VECTORS] 
 }
 
 #[inline(always)]
-fn multiply_add<S: Simd, const ROWS: usize, const VECTORS: usize>(
+fn multiply_add<S: Simd, E: Edge, const ROWS: usize, const VECTORS: usize>(
     simd: S,
     sums: &mut [[S::f32s; VECTORS]; ROWS],
     left: [f32; ROWS],
@@ -218,7 +236,7 @@ fn multiply_add<S: Simd, const ROWS: usize, const VECTORS: usize>(
     for (sums, left) in sums.iter_mut().zip(left) {
         let left = simd.splat_f32s(left);
         for (sum, right) in sums.iter_mut().zip(right) {
-            *sum = simd.mul_add_f32s(left, right, *sum);
+            *sum = if E::FUSED { simd.mul_add_f32s(left, right, *sum) } else { simd.add_f32s(*sum, simd.mul_f32s(left, right)) };
         }
     }
 }

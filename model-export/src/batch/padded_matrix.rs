@@ -11,10 +11,14 @@ pub const LANES: usize = 16;
 /// few sets of the first-level cache.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PaddedMatrix {
-    pub(super) rows: usize,
-    pub(super) columns: usize,
-    pub(super) stride: usize,
-    pub(super) values: Vec<f32>,
+    /// Rows.
+    pub rows: usize,
+    /// Columns, padding not counted.
+    pub columns: usize,
+    /// Numbers from one row's first to the next row's first.
+    pub stride: usize,
+    /// The rows one after the other, each with its padding.
+    pub values: Vec<f32>,
 }
 
 impl PaddedMatrix {
@@ -56,23 +60,23 @@ impl PaddedMatrix {
     }
 
     /// The columns rounded up to whole vectors.
-    pub(super) fn width(&self) -> usize {
+    pub fn width(&self) -> usize {
         self.columns.next_multiple_of(LANES)
     }
 
     /// One row with its padding up to [`PaddedMatrix::width`].
-    pub(super) fn wide_row_mut(&mut self, row: usize) -> &mut [f32] {
+    pub fn wide_row_mut(&mut self, row: usize) -> &mut [f32] {
         let width = self.width();
         &mut self.values[row * self.stride..][..width]
     }
 
     /// Copies one row of a matrix with as many columns.
-    pub(super) fn copy_row(&mut self, row: usize, from: &Self, from_row: usize) {
+    pub fn copy_row(&mut self, row: usize, from: &Self, from_row: usize) {
         self.row_mut(row).copy_from_slice(from.row(from_row));
     }
 
     /// Writes the transpose of `from`, in blocks of 16 × 16 that are transposed in registers.
-    pub(super) fn copy_transposed(&mut self, arch: Arch, from: &Self) {
+    pub fn copy_transposed(&mut self, arch: Arch, from: &Self) {
         arch.dispatch(Transposition { from, to: self });
     }
 }

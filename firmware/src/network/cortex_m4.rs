@@ -1,0 +1,454 @@
+//! The kernels for the Cortex-M4F, in assembly: the only unsafe code of the project.
+//!
+//! *in* slices whose lengths and alignment the safe wrappers check; *out* the bits of the [portable twin](super::portable); *never*
+//! a branch that depends on data: the cycles of a layer follow from its shape; *source* the instruction timings of the Cortex-M4
+//! Technical Reference Manual, section 3.3: SMLAD, LSL, VMUL, VADD 1 cycle; n loads in a row (LDR or LDM) n + 1.
+//!
+//! # Integers
+//! Eight accumulators in r6-r12 and lr; r4 streams the weights, r5 the inputs; r0-r3 hold an input word and weights, or two input
+//! words while one gives way to the next. What a block needs only once waits in s0-s6 (1 cycle to fetch). Account for int8, of
+//! 4 inputs × 8 rows = 32 multiplications: 16 SMLAD, 8 LSL, 8 + 2 words loaded in three runs: 16 + 8 + 10 + 3 = 37 cycles; int16:
+//! 16 + 18 + 6 = 40. Five chunks are unrolled; their number's remainder decides where the first pass enters. A block adds about 67: 9 biases, 10 multipliers, 24 SMMLAR, USAT, PKHBT and UQSUB16, the rest control.
+//!
+//! # Floats
+//! Eight accumulators in s0-s7, two inputs' weights in s8-s23, eight inputs in s24-s31. Eight inputs × 8 rows: 64 VMUL, 64 VADD,
+//! 4 × 17 + 9 cycles of VLDM: 205. No result is used by the next instruction, which would stall.
+#![allow(unsafe_code)]
+
+use core::arch::naked_asm;
+
+use super::{Finish, Width};
+use crate::network::ROWS;
+
+/// Chunks of four inputs in the unrolled integer loops.
+const UNROLLED: usize = 5;
+
+/// Arguments of the integer kernels, in the order in which they load them.
+#[repr(C)]
+struct Integer {
+    stream: *const [u8; 4],
+    inputs: *const u32,
+    inputs_end: *const u32,
+    outputs: *mut u32,
+    outputs_end: *const u32,
+    /// Added to a code before USAT and subtracted after it, so that 16 bits saturate at the limit; 0: signed codes; 1: sums.
+    offset: u32,
+    /// `offset` in both halves.
+    offsets: u32,
+}
+
+/// Whether a stream lies on a word boundary, as LDM needs.
+fn aligned(stream: &[[u8; 4]]) -> bool {
+    stream.as_ptr().addr().is_multiple_of(4)
+}
+
+/// [`super::integer`], if the arguments suit the kernel; else `false` and nothing has been done.
+pub(super) fn integer(width: Width, stream: &[[u8; 4]], inputs: &[u32], finish: Finish, outputs: &mut [u32]) -> bool {
+    let blocks = outputs.len() / finish.words();
+    let whole = outputs.len() == blocks * finish.words() && blocks > 0;
+    let pairs = !inputs.is_empty() && inputs.len().is_multiple_of(2);
+    if !(whole && pairs && aligned(stream) && stream.len() == blocks * width.block(inputs.len())) {
+        return false;
+    }
+    let offset = match finish {
+        Finish::Codes { limit } => 65_535 - u32::from(limit.min(i16::MAX as u16)),
+        Finish::Preactivations => 0,
+        Finish::Sums => 1,
+    };
+    let (inputs, outputs) = (inputs.as_ptr_range(), outputs.as_mut_ptr_range());
+    let arguments = Integer {
+        stream: stream.as_ptr(),
+        inputs: inputs.start,
+        inputs_end: inputs.end,
+        outputs: outputs.start,
+        outputs_end: outputs.end,
+        offset,
+        offsets: offset << 16 | offset,
+    };
+    let chunks = (arguments.inputs_end.addr() - arguments.inputs.addr()) / 8;
+    let skipped = (UNROLLED - chunks % UNROLLED) % UNROLLED;
+    // SAFETY: the pointers come from live slices, `stream` is aligned to words, and the three lengths fit together (checked above): the
+    // kernel reads exactly `blocks` blocks of the stream and, for each, all of `inputs` (a whole number of chunks, `skipped` fewer than
+    // a multiple of the unrolled loop's); it writes exactly `outputs`. It keeps the registers that the calling convention protects.
+    unsafe {
+        match width {
+            Width::Int8 => int8(&arguments, skipped),
+            Width::Int16 => int16(&arguments, skipped),
+        }
+    }
+    true
+}
+
+// Every instruction of the integer kernels is 32 bits wide and so lies on a word: branch targets cost no second fetch, and the loop with
+// its block's end (0.9 KiB) fits into the 1 KiB of an STM32F4's instruction cache.
+
+/// SMLAD of two rows with a word of bytes: `lsls` is the only unpacking.
+macro_rules! two_rows {
+    ($word:literal, $input:literal, $even:literal, $odd:literal) => {
+        concat!(
+            "smlad ", $even, ", ", $word, ", ", $input, ", ", $even, "\n", "lsl.w ", $word, ", ", $word, ", #8\n", "smlad ",
+            $odd, ", ", $word, ", ", $input, ", ", $odd, "\n",
+        )
+    };
+}
+
+/// Four inputs, eight rows, bytes. r4 points at the last word that was used.
+macro_rules! int8_chunk {
+    () => {
+        concat!(
+            "ldr.w r0, [r5], #4\n",
+            "ldr.w r1, [r4, #4]\n",
+            "ldr.w r2, [r4, #8]\n",
+            "ldr.w r3, [r4, #12]\n",
+            two_rows!("r1", "r0", "r6", "r7"),
+            two_rows!("r2", "r0", "r8", "r9"),
+            two_rows!("r3", "r0", "r10", "r11"),
+            "ldr.w r1, [r4, #16]\n",
+            "ldr.w r2, [r5], #4\n",
+            "ldr.w r3, [r4, #20]\n",
+            two_rows!("r1", "r0", "r12", "lr"),
+            two_rows!("r3", "r2", "r6", "r7"),
+            "ldr.w r0, [r4, #24]\n",
+            "ldr.w r1, [r4, #28]\n",
+            "ldr.w r3, [r4, #32]!\n",
+            two_rows!("r0", "r2", "r8", "r9"),
+            two_rows!("r1", "r2", "r10", "r11"),
+            two_rows!("r3", "r2", "r12", "lr"),
+        )
+    };
+}
+
+/// SMLAD of one row with a word of halves.
+macro_rules! one_row {
+    ($word:literal, $input:literal, $row:literal) => {
+        concat!("smlad ", $row, ", ", $word, ", ", $input, ", ", $row, "\n")
+    };
+}
+
+/// Four inputs, eight rows, halves. r4 points at the last word that was used.
+macro_rules! int16_chunk {
+    () => {
+        concat!(
+            "ldr.w r0, [r5], #4\n",
+            "ldr.w r1, [r4, #4]\n",
+            "ldr.w r2, [r4, #8]\n",
+            "ldr.w r3, [r4, #12]\n",
+            one_row!("r1", "r0", "r6"),
+            one_row!("r2", "r0", "r7"),
+            one_row!("r3", "r0", "r8"),
+            "ldr.w r1, [r4, #16]\n",
+            "ldr.w r2, [r4, #20]\n",
+            "ldr.w r3, [r4, #24]\n",
+            one_row!("r1", "r0", "r9"),
+            one_row!("r2", "r0", "r10"),
+            one_row!("r3", "r0", "r11"),
+            "ldr.w r1, [r4, #28]\n",
+            "ldr.w r2, [r4, #32]\n",
+            "ldr.w r3, [r5], #4\n",
+            one_row!("r1", "r0", "r12"),
+            one_row!("r2", "r0", "lr"),
+            "ldr.w r0, [r4, #36]\n",
+            "ldr.w r1, [r4, #40]\n",
+            "ldr.w r2, [r4, #44]\n",
+            one_row!("r0", "r3", "r6"),
+            one_row!("r1", "r3", "r7"),
+            one_row!("r2", "r3", "r8"),
+            "ldr.w r0, [r4, #48]\n",
+            "ldr.w r1, [r4, #52]\n",
+            "ldr.w r2, [r4, #56]\n",
+            one_row!("r0", "r3", "r9"),
+            one_row!("r1", "r3", "r10"),
+            one_row!("r2", "r3", "r11"),
+            "ldr.w r0, [r4, #60]\n",
+            "ldr.w r1, [r4, #64]!\n",
+            one_row!("r0", "r3", "r12"),
+            one_row!("r1", "r3", "lr"),
+        )
+    };
+}
+
+/// A whole integer kernel round a chunk. Arguments: r0 an [`Integer`], r1 chunks to skip in the first pass of the unrolled loop.
+macro_rules! integer_kernel {
+    ($chunk:expr) => {
+        naked_asm!(
+            ".arch armv7e-m",
+            ".fpu fpv4-sp-d16",
+            ".balign 4",
+            "push {{r4-r11, lr}}",
+            "adr.w r2, 30f",
+            "ldr.w r1, [r2, r1, lsl #2]",
+            "vmov s2, r1",
+            "ldm.w r0, {{r4-r10}}",
+            "vmov s0, r5",
+            "vmov s1, r6",
+            "vmov s3, r7",
+            "vmov s4, r8",
+            "vmov s5, r9",
+            "vmov s6, r10",
+            // A block: biases, and into the loop.
+            "20:",
+            "ldm.w r4, {{r6-r12, lr}}",
+            "vmov r5, s0",
+            "vmov r0, s2",
+            "add.w r4, r4, #28",
+            "bx r0",
+            ".balign 4",
+            "10:",
+            $chunk,
+            "11:",
+            $chunk,
+            "12:",
+            $chunk,
+            "13:",
+            $chunk,
+            "14:",
+            $chunk,
+            "vmov r0, s1",
+            "cmp.w r5, r0",
+            "bne.w 10b",
+            "vmov r5, s5",
+            "add.w r4, r4, #4",
+            "cmp.w r5, #1",
+            "bls.w 40f",
+            // ReLU: with the offset, 16 unsigned bits saturate at the limit; taking it away saturates at 0.
+            "ldm.w r4!, {{r0-r3}}",
+            "smmlar r6, r6, r0, r5",
+            "smmlar r7, r7, r1, r5",
+            "smmlar r8, r8, r2, r5",
+            "smmlar r9, r9, r3, r5",
+            "ldm.w r4!, {{r0-r3}}",
+            "smmlar r10, r10, r0, r5",
+            "smmlar r11, r11, r1, r5",
+            "smmlar r12, r12, r2, r5",
+            "smmlar lr, lr, r3, r5",
+            "vmov r5, s6",
+            "vmov r0, s3",
+            "usat r6, #16, r6",
+            "usat r7, #16, r7",
+            "usat r8, #16, r8",
+            "usat r9, #16, r9",
+            "usat r10, #16, r10",
+            "usat r11, #16, r11",
+            "usat r12, #16, r12",
+            "usat lr, #16, lr",
+            "pkhbt r6, r6, r7, lsl #16",
+            "pkhbt r7, r8, r9, lsl #16",
+            "pkhbt r8, r10, r11, lsl #16",
+            "pkhbt r9, r12, lr, lsl #16",
+            "uqsub16 r6, r6, r5",
+            "uqsub16 r7, r7, r5",
+            "uqsub16 r8, r8, r5",
+            "uqsub16 r9, r9, r5",
+            "21:",
+            "vmov r1, s4",
+            "stm.w r0!, {{r6-r9}}",
+            "cmp.w r0, r1",
+            "vmov s3, r0",
+            "bne.w 20b",
+            "pop {{r4-r11, pc}}",
+            ".balign 4",
+            "30:",
+            ".word 10b + 1, 11b + 1, 12b + 1, 13b + 1, 14b + 1",
+            // Signed codes, then sums.
+            "40:",
+            "beq.w 41f",
+            "ldm.w r4!, {{r0-r3}}",
+            "smmulr r6, r6, r0",
+            "smmulr r7, r7, r1",
+            "smmulr r8, r8, r2",
+            "smmulr r9, r9, r3",
+            "ldm.w r4!, {{r0-r3}}",
+            "smmulr r10, r10, r0",
+            "smmulr r11, r11, r1",
+            "smmulr r12, r12, r2",
+            "smmulr lr, lr, r3",
+            "vmov r0, s3",
+            "ssat r6, #16, r6",
+            "ssat r7, #16, r7",
+            "ssat r8, #16, r8",
+            "ssat r9, #16, r9",
+            "ssat r10, #16, r10",
+            "ssat r11, #16, r11",
+            "ssat r12, #16, r12",
+            "ssat lr, #16, lr",
+            "pkhbt r6, r6, r7, lsl #16",
+            "pkhbt r7, r8, r9, lsl #16",
+            "pkhbt r8, r10, r11, lsl #16",
+            "pkhbt r9, r12, lr, lsl #16",
+            "b.w 21b",
+            "41:",
+            "vmov r0, s3",
+            "vmov r1, s4",
+            "add.w r4, r4, #32",
+            "stm.w r0!, {{r6-r12, lr}}",
+            "cmp.w r0, r1",
+            "vmov s3, r0",
+            "bne.w 20b",
+            "pop {{r4-r11, pc}}",
+        )
+    };
+}
+
+/// # Safety
+/// `arguments` must describe live, aligned memory of fitting lengths, and `skipped` must be below [`UNROLLED`].
+#[unsafe(naked)]
+unsafe extern "C" fn int8(arguments: &Integer, skipped: usize) {
+    integer_kernel!(int8_chunk!())
+}
+
+/// # Safety
+/// As for [`int8`].
+#[unsafe(naked)]
+unsafe extern "C" fn int16(arguments: &Integer, skipped: usize) {
+    integer_kernel!(int16_chunk!())
+}
+
+/// Arguments of the float kernel, in the order in which it loads them.
+#[repr(C)]
+struct Float {
+    stream: *const [u8; 4],
+    inputs: *const u32,
+    outputs: *mut u32,
+    outputs_end: *const u32,
+    /// Behind the last whole group of eight inputs.
+    groups_end: *const u32,
+    inputs_end: *const u32,
+    /// 0: ReLU.
+    linear: u32,
+}
+
+/// [`super::float`], if the arguments suit the kernel; else `false` and nothing has been done.
+pub(super) fn float(stream: &[[u8; 4]], inputs: &[u32], relu: bool, outputs: &mut [u32]) -> bool {
+    let blocks = outputs.len() / ROWS;
+    let pairs = !inputs.is_empty() && inputs.len().is_multiple_of(2);
+    let whole = outputs.len() == blocks * ROWS && blocks > 0;
+    if !(whole && pairs && aligned(stream) && stream.len() == blocks * ROWS * (1 + inputs.len())) {
+        return false;
+    }
+    let groups = inputs.as_chunks::<8>().0.as_ptr_range();
+    let (inputs, outputs) = (inputs.as_ptr_range(), outputs.as_mut_ptr_range());
+    let arguments = Float {
+        stream: stream.as_ptr(),
+        inputs: inputs.start,
+        outputs: outputs.start,
+        outputs_end: outputs.end,
+        groups_end: groups.end.cast(),
+        inputs_end: inputs.end,
+        linear: u32::from(!relu),
+    };
+    // SAFETY: the pointers come from live slices, `stream` is aligned to words, and the three lengths fit together (checked above): the
+    // kernel reads exactly `blocks` blocks of the stream and, for each, all of `inputs` (whole groups of eight, then pairs); it writes
+    // exactly `outputs`. It keeps the registers that the calling convention protects.
+    unsafe { float_kernel(&arguments) };
+    true
+}
+
+/// Two inputs, eight rows: `$first` and `$second` hold the inputs.
+macro_rules! float_step {
+    ($first:literal, $second:literal) => {
+        concat!(
+            "vldm r0!, {{s8-s23}}\n",
+            float_products!($first, "s8" "s9" "s10" "s11" "s12" "s13" "s14" "s15"),
+            float_sums!("s8" "s9" "s10" "s11" "s12" "s13" "s14" "s15"),
+            float_products!($second, "s16" "s17" "s18" "s19" "s20" "s21" "s22" "s23"),
+            float_sums!("s16" "s17" "s18" "s19" "s20" "s21" "s22" "s23"),
+        )
+    };
+}
+
+/// Weights times an input, in place.
+macro_rules! float_products {
+    ($input:literal, $($weight:literal)*) => {
+        concat!($("vmul.f32 ", $weight, ", ", $weight, ", ", $input, "\n"),*)
+    };
+}
+
+/// Adds eight products to the accumulators.
+macro_rules! float_sums {
+    ($a:literal $b:literal $c:literal $d:literal $e:literal $f:literal $g:literal $h:literal) => {
+        concat!(
+            "vadd.f32 s0, s0, ",
+            $a,
+            "\nvadd.f32 s1, s1, ",
+            $b,
+            "\nvadd.f32 s2, s2, ",
+            $c,
+            "\nvadd.f32 s3, s3, ",
+            $d,
+            "\nvadd.f32 s4, s4, ",
+            $e,
+            "\nvadd.f32 s5, s5, ",
+            $f,
+            "\nvadd.f32 s6, s6, ",
+            $g,
+            "\nvadd.f32 s7, s7, ",
+            $h,
+            "\n",
+        )
+    };
+}
+
+/// # Safety
+/// `arguments` must describe live, aligned memory of fitting lengths.
+#[unsafe(naked)]
+unsafe extern "C" fn float_kernel(arguments: &Float) {
+    naked_asm!(
+        ".arch armv7e-m",
+        ".fpu fpv4-sp-d16",
+        "push {{r4-r10, lr}}",
+        "vpush {{s16-s31}}",
+        "ldm r0, {{r0-r3, r8-r10}}",
+        "20:",
+        "vldm r0!, {{s0-s7}}",
+        "mov r12, r1",
+        "cmp r12, r8",
+        "beq 12f",
+        ".balign 4",
+        "10:",
+        "vldm r12!, {{s24-s31}}",
+        float_step!("s24", "s25"),
+        float_step!("s26", "s27"),
+        float_step!("s28", "s29"),
+        float_step!("s30", "s31"),
+        "cmp r12, r8",
+        "bne.w 10b",
+        "12:",
+        "cmp r12, r9",
+        "bne 30f",
+        "13:",
+        "cmp r10, #0",
+        "bne 40f",
+        "vmov r4, s0",
+        "vmov r5, s1",
+        "vmov r6, s2",
+        "vmov r7, s3",
+        "bic r4, r4, r4, asr #31",
+        "bic r5, r5, r5, asr #31",
+        "bic r6, r6, r6, asr #31",
+        "bic r7, r7, r7, asr #31",
+        "stm r2!, {{r4-r7}}",
+        "vmov r4, s4",
+        "vmov r5, s5",
+        "vmov r6, s6",
+        "vmov r7, s7",
+        "bic r4, r4, r4, asr #31",
+        "bic r5, r5, r5, asr #31",
+        "bic r6, r6, r6, asr #31",
+        "bic r7, r7, r7, asr #31",
+        "stm r2!, {{r4-r7}}",
+        "14:",
+        "cmp r2, r3",
+        "bne.w 20b",
+        "vpop {{s16-s31}}",
+        "pop {{r4-r10, pc}}",
+        "30:",
+        "vldm r12!, {{s24-s25}}",
+        float_step!("s24", "s25"),
+        "cmp r12, r9",
+        "bne 30b",
+        "b 13b",
+        "40:",
+        "vstm r2!, {{s0-s7}}",
+        "b 14b",
+    )
+}

@@ -1,0 +1,110 @@
+//! Dense layers over a packed stream of weights: what the kernels compute, and which of them runs.
+//!
+//! *in* one layer's stream and the words of its inputs; *out* the words of its outputs; *never* reads beyond the slices, panics or
+//! gives other bits on another machine; *source* the packed orders below.
+//!
+//! On a Cortex-M4F [`mod@self`] runs hand-written assembly, elsewhere (and for a stream that is not aligned to words) the
+//! [portable twin](portable). Both give the same bits. The choice is made by the target that is compiled for, in `build.rs`.
+//!
+//! # Integer stream
+//! For each block of [`ROWS`] outputs: eight i32 biases, the weights, and eight words of requantisation (i32 multipliers; f32 row
+//! scales in the last layer, which the kernel skips). Inputs are 16-bit codes, two to a word, the first one in the low half.
+//! - [`Width::Int16`]: for each pair of inputs eight words, one a row: the halves are the weights of the pair, low half first.
+//! - [`Width::Int8`]: for each pair of inputs four words of four bytes, one for two rows. The even row's weights are the word's
+//!   halves, the odd row's are the halves of the same word moved up by eight bits. So a byte is one row's weight *and* the fraction
+//!   of another's; in units of 1/256 of an int8 step, with bytes b₀…b₃ (b as signed, u as unsigned),
+//!
+//!   | | first input | second input |
+//!   |---|--:|--:|
+//!   | even row | 256 b₁ + u₀ | 256 b₃ + u₂ |
+//!   | odd row | 256 b₀ | 256 b₂ + u₁ |
+//!
+//!   These are the exact weights on every machine. Who packs chooses b₀, then b₁, b₂, b₃, and so has each of them within half a step.
+//!
+//! An accumulator is bias + Σ weight × code, modulo 2³²; the loader proves that the sum itself never leaves 32 bits.
+//!
+//! # Float stream
+//! For each block of [`ROWS`] outputs: eight f32 biases, then for each input eight f32 weights. An accumulator starts at the bias and
+//! adds weight × input in the inputs' order, each product and each sum rounded.
+//!
+//! The number of inputs is padded with zero weights: to a multiple of 4 (integers) or of 2 (floats); outputs to whole blocks.
+
+#[cfg(cortex_m4)]
+#[path = "cortex_m4.rs"]
+mod cortex_m4;
+#[path = "portable.rs"]
+pub mod portable;
+
+use super::ROWS;
+
+/// Bits of a packed weight.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Width {
+    /// One byte for each weight.
+    Int8,
+    /// Two bytes for each weight.
+    Int16,
+}
+
+impl Width {
+    /// Words of weights for each word of inputs in a block.
+    pub const fn words(self) -> usize {
+        match self {
+            Self::Int8 => ROWS / 2,
+            Self::Int16 => ROWS,
+        }
+    }
+
+    /// Words of a block whose inputs take `inputs` words.
+    pub const fn block(self, inputs: usize) -> usize {
+        2 * ROWS + self.words() * inputs
+    }
+}
+
+/// What becomes of an accumulator *a* with multiplier *m*.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Finish {
+    /// ReLU: ⌊a m / 2³² + ½⌋ within 0..=limit, two to a word.
+    Codes {
+        /// Largest code, at most 32,767.
+        limit: u16,
+    },
+    /// ⌊a m / 2³² + ½⌋ within −32,768..=32,767, two to a word.
+    Preactivations,
+    /// The accumulator itself, one to a word.
+    Sums,
+}
+
+impl Finish {
+    /// Words of outputs for each block.
+    pub const fn words(self) -> usize {
+        match self {
+            Self::Codes { .. } | Self::Preactivations => ROWS / 2,
+            Self::Sums => ROWS,
+        }
+    }
+}
+
+/// Which kernel [`integer`] and [`float`] run on an aligned stream.
+pub const NAME: &str = if cfg!(cortex_m4) { "Cortex-M4 assembly" } else { "portable" };
+
+/// Runs an integer layer. `inputs` are pairs of codes (an even number of words), `outputs` as many words as there are blocks in
+/// `stream` times [`Finish::words`]; what has no counterpart is left as it is.
+#[inline]
+pub fn integer(width: Width, stream: &[[u8; 4]], inputs: &[u32], finish: Finish, outputs: &mut [u32]) {
+    #[cfg(cortex_m4)]
+    if cortex_m4::integer(width, stream, inputs, finish, outputs) {
+        return;
+    }
+    portable::integer(width, stream, inputs, finish, outputs);
+}
+
+/// Runs a float layer. `inputs` are the bits of an even number of f32, `outputs` those of [`ROWS`] f32 for each block in `stream`.
+#[inline]
+pub fn float(stream: &[[u8; 4]], inputs: &[u32], relu: bool, outputs: &mut [u32]) {
+    #[cfg(cortex_m4)]
+    if cortex_m4::float(stream, inputs, relu, outputs) {
+        return;
+    }
+    portable::float(stream, inputs, relu, outputs);
+}

@@ -1,0 +1,54 @@
+//! Working memory of an evaluation.
+
+use super::{INPUT_PADDING, padded};
+use crate::model::{Arithmetic, MAX_FEATURES, MAX_WIDTH, NetworkLayout};
+
+/// Words that are enough for every network.
+pub const MAX_SCRATCH: usize = 2 * MAX_WIDTH;
+const _: () = assert!(MAX_FEATURES <= MAX_WIDTH && MAX_WIDTH.is_multiple_of(super::ROWS));
+
+/// `WORDS` words for the activations of two layers. Without a number it serves any network; [`super::Network::scratch_words`] says how
+/// many one network needs (128 words, 512 bytes, for integer layers of 128 units).
+#[derive(Clone, Debug)]
+pub struct Scratch<const WORDS: usize = MAX_SCRATCH> {
+    words: [u32; WORDS],
+}
+
+impl Scratch {
+    /// Zeroed memory for any network.
+    pub const fn new() -> Self {
+        Self::sized()
+    }
+}
+
+impl<const WORDS: usize> Scratch<WORDS> {
+    /// Zeroed memory of this size.
+    pub const fn sized() -> Self {
+        Self { words: [0; WORDS] }
+    }
+
+    /// The words.
+    #[inline(always)]
+    pub(super) fn words(&mut self) -> &mut [u32] {
+        &mut self.words
+    }
+}
+
+impl<const WORDS: usize> Default for Scratch<WORDS> {
+    fn default() -> Self {
+        Self::sized()
+    }
+}
+
+/// Words of the activations of the widest layer of a checked network, the inputs included.
+pub(super) fn half(layout: &NetworkLayout, inputs: usize) -> usize {
+    let padded_inputs = inputs.next_multiple_of(INPUT_PADDING);
+    let (codes, skip) = match layout.arithmetic {
+        Arithmetic::Float => (1, 0),
+        Arithmetic::Int16 | Arithmetic::Int8 => (2, layout.skip.length),
+    };
+    // Beside integer layers, the skip's inputs wait in the half into which the first layer will write.
+    let normalised = if skip > 0 || layout.layers.is_empty() { padded_inputs } else { 0 };
+    let hidden = layout.layers.iter().rev().skip(1).map(|layer| padded(usize::from(layer.outputs)) / codes);
+    hidden.fold(normalised.max(padded_inputs / codes), usize::max)
+}

@@ -1,0 +1,101 @@
+//! What the decoder of model files must survive: any bytes, and files that are whole but for their content.
+//!
+//! *in* bytes; *out* whether a model was loaded from them and flown; *never* a panic, an overflow or a read out of bounds, whatever the
+//! bytes: that is what the fuzz target and the test on stable Rust look for.
+
+use impromptu_firmware::{
+    adapter::{Adapter, Lanes},
+    feedback::{self, Lane},
+    model::{Blob, Card, MAX_FEATURES, MAX_OUTPUTS, Model, Probes, Section, file},
+    network::Scratch,
+    preview::{EndRule, Preview},
+};
+
+/// Inputs that break arithmetic which trusts them.
+const EXTREMES: [f32; 8] = [0.0, 1.0, -3.4e38, 3.4e38, 1e-40, f32::INFINITY, f32::NEG_INFINITY, f32::NAN];
+/// Samples that the adapter's preview holds here.
+const PREVIEW: usize = 256;
+
+/// Loads the bytes as they are, then with a header that fits, then with probes that fit too; flies whatever loads.
+pub fn survive(bytes: &[u8]) -> bool {
+    let raw = load(bytes);
+    let repaired = with_header(bytes);
+    let loaded = load(&repaired) | raw;
+    with_probes(&repaired).is_some_and(|bytes| load(&bytes)) | loaded
+}
+
+/// Loads a file; if that works, evaluates the network at zero and extremes and flies both lanes.
+fn load(bytes: &[u8]) -> bool {
+    let Ok(model) = Model::from_bytes(bytes) else { return false };
+    let _ = model.card().preview_span();
+    if let Some(network) = model.network() {
+        let (mut outputs, mut scratch) = ([0.0; MAX_OUTPUTS], Scratch::new());
+        for input in EXTREMES {
+            network.evaluate(&[input; MAX_FEATURES], &mut outputs, &mut scratch);
+        }
+        let mixed: [f32; MAX_FEATURES] = core::array::from_fn(|i| EXTREMES[i % EXTREMES.len()]);
+        network.evaluate(&mixed, &mut outputs, &mut scratch);
+    }
+    if let Some(lane) = model.lane() {
+        let _ = feedback::probe(lane, 1.0 / model.card().timing.reference_rate_hz);
+    }
+    fly(&model);
+    true
+}
+
+/// Steps an adapter of a loop with two channels each, if the model is for one.
+fn fly(model: &Model<'_>) {
+    let card = model.card();
+    let Ok(mut adapter) = Adapter::<2, 2, 2>::new(model, &card.signals, card.timing.reference_rate_hz, PREVIEW) else { return };
+    adapter.switch(Lanes::BOTH);
+    let mut preview = Preview::<2, PREVIEW>::new([EndRule::Hold; 2], 0);
+    for tick in 0..24 {
+        let value = EXTREMES[tick as usize % EXTREMES.len()];
+        preview.push([value, -value]);
+        let reference = adapter.step(tick, &preview, &[-value, value]);
+        let limits = card.outputs.iter().map(|output| output.limit);
+        assert!(adapter.correction().iter().zip(limits).all(|(value, limit)| value.abs() <= limit), "{reference:?}");
+    }
+}
+
+/// The bytes as a file: magic, version, lengths and check sum put right. The card's length stays if it is possible.
+fn with_header(bytes: &[u8]) -> Vec<u8> {
+    let body = bytes.get(file::HEADER..).unwrap_or_default();
+    let announced = bytes.get(12..16).map_or(0, |word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]) as usize);
+    let card = if announced <= body.len() { announced } else { announced % (body.len() + 1) };
+    let blob = body.len().saturating_sub(card.next_multiple_of(file::ALIGNMENT));
+    let end = card.next_multiple_of(file::ALIGNMENT) + blob;
+    let mut repaired = file::header(card as u32, blob as u32).to_vec();
+    repaired.extend(body);
+    repaired.resize(file::HEADER + end, 0);
+    sealed(repaired)
+}
+
+/// The file with no network probe and the lane probe that its lane gives, so that edited numbers get past the probes.
+fn with_probes(bytes: &[u8]) -> Option<Vec<u8>> {
+    let (card, blob) = file::split(bytes).ok()?;
+    let mut card: Card<'_> = postcard::from_bytes(card).ok()?;
+    let mut blob = blob.to_vec();
+    let mut probe = Vec::new();
+    if let Some(layout) = &card.lane {
+        let lane = Lane::new(layout, &Blob::new(&blob)).ok()?;
+        let outputs = feedback::probe(&lane, 1.0 / card.timing.reference_rate_hz);
+        probe.extend(outputs.iter().take(layout.axes.len()).flat_map(|output| output.to_le_bytes()));
+    }
+    blob.resize(blob.len().next_multiple_of(file::ALIGNMENT), 0);
+    card.probes =
+        Probes { count: 0, network: Section::default(), lane: Section { offset: blob.len() as u32, length: probe.len() as u32 } };
+    blob.extend(probe);
+    let card = postcard::to_allocvec(&card).ok()?;
+    let mut bytes = file::header(card.len() as u32, blob.len() as u32).to_vec();
+    bytes.extend(card);
+    bytes.resize(bytes.len().next_multiple_of(file::ALIGNMENT), 0);
+    bytes.extend(blob);
+    Some(sealed(bytes))
+}
+
+fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
+    let checksum = file::checksum(&bytes);
+    bytes[20..24].copy_from_slice(&checksum.to_le_bytes());
+    bytes
+}
