@@ -125,8 +125,7 @@ pub fn quantise<'r>(network: &FloatNetwork, width: Width, rows: impl Iterator<It
     let float: Vec<Vec<f32>> =
         rows.iter().step_by(rows.len().div_ceil(ROUNDING_ROWS).max(1)).map(|row| normalised(network, row)).collect();
     let quantised = float.iter().map(|row| row.iter().map(|x| f64::from(*x)).collect()).collect();
-    let mut inputs =
-        Inputs { range: f64::from(input_range * HEADROOM), signed: true, finest: f64::INFINITY, float, quantised };
+    let mut inputs = Inputs { range: f64::from(input_range * HEADROOM), signed: true, finest: f64::INFINITY, float, quantised };
     let mut result = IntegerNetwork { input_code: 1.0, layers: Vec::new() };
     // Of the layer before: for each row the accumulator's unit.
     let mut units: Vec<f64> = Vec::new();
@@ -239,7 +238,8 @@ fn moments(rows: &[Vec<f64>], count: usize) -> DMatrix<f64> {
 /// The bias, plus the mean by which the quantised weights on quantised inputs fall short of the float layer.
 fn corrected_bias(layer: &DenseLayer, inputs: &Inputs, weights: &[i16], stride: usize, scales: &[f64]) -> Vec<f64> {
     let count = layer.weights.len() / layer.outputs().max(1);
-    let mean = |row: &dyn Fn(usize) -> f64| -> f64 { (0..inputs.float.len()).map(row).sum::<f64>() / inputs.float.len().max(1) as f64 };
+    let mean =
+        |row: &dyn Fn(usize) -> f64| -> f64 { (0..inputs.float.len()).map(row).sum::<f64>() / inputs.float.len().max(1) as f64 };
     let float: Vec<f64> = (0..count).map(|input| mean(&|row| f64::from(inputs.float[row][input]))).collect();
     let quantised: Vec<f64> = (0..count).map(|input| mean(&|row| inputs.quantised[row][input])).collect();
     let row = |(index, bias): (usize, &f32)| {

@@ -2,7 +2,9 @@
 //!
 //! - [`demo`]: what `cargo run --release` shows, threshold by threshold, and that the README tells the same;
 //! - [`board`]: whole flights on the emulated microcontroller, bit by bit, with golden instruction counts;
-//! - [`emulator`]: the emulator is found, fails loudly, and counts repeatably.
+//! - [`emulator`]: the emulator is found, fails loudly, and counts repeatably;
+//! - [`kernels`]: the network kernels in assembly give the bits of their portable twin;
+//! - [`unsafe_code`]: there is none but those kernels, each block with its reason.
 //!
 //! The parts have tests of their own: plant against an independent simulator and every generator and parser in `host-sim`, model
 //! files bit by bit damaged in `model-export`, kernels and values in `firmware`.
@@ -10,3 +12,5 @@
 mod board;
 mod demo;
 mod emulator;
+mod kernels;
+mod unsafe_code;

@@ -6,8 +6,8 @@ mod command_line;
 mod damage;
 mod description;
 mod golden;
-mod refusals;
 mod precision;
+mod refusals;
 mod round_trip;
 
 mod adapter;
