@@ -29,6 +29,9 @@ pub(super) struct Layer<'a> {
     factor: i32,
 }
 
+/// Biases, weights and requantisation of eight rows.
+type Block<'a> = (&'a [[u8; 4]; ROWS], &'a [[u8; 4]], &'a [[u8; 4]; ROWS]);
+
 impl<'a> Layer<'a> {
     /// Checks layer `index`; `before` is the activation that gives its inputs, `next_limit` the limit of the codes that it gives.
     pub(super) fn new(
@@ -65,8 +68,7 @@ impl<'a> Layer<'a> {
         Ok(layer)
     }
 
-    /// Biases, weights and requantisation of each block of rows.
-    fn blocks(&self) -> impl Iterator<Item = (&'a [[u8; 4]; ROWS], &'a [[u8; 4]], &'a [[u8; 4]; ROWS])> + use<'a> {
+    fn blocks(&self) -> impl Iterator<Item = Block<'a>> + use<'a> {
         self.stream.chunks(self.width.block(self.inputs.into())).filter_map(|block| {
             let (bias, rest) = block.split_first_chunk()?;
             let (weights, requantisation) = rest.split_last_chunk()?;

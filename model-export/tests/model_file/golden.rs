@@ -16,13 +16,13 @@ fn the_format_is_what_it_was() {
     assert_eq!(
         hexadecimal(&bytes[..64]),
         [
-            "494d50524f4d5054010000002c010000",
-            "f4010000d0b3b9ec0000000000000000",
+            "494d50524f4d50540100000028010000",
+            "44020000f036f89d0000000000000000",
             "05736d616c6c04636172740000047465",
             "73740700000208706f736974696f6e01",
         ]
     );
-    assert_eq!((bytes.len(), Model::from_bytes(&bytes).unwrap().checksum(), file::VERSION), (836, 0xecb9_b3d0, 1));
+    assert_eq!((bytes.len(), Model::from_bytes(&bytes).unwrap().checksum(), file::VERSION), (916, 0x9df8_36f0, 1));
     let float = small_model(Precision::Float);
     assert_eq!((float.len(), Model::from_bytes(&float).unwrap().checksum()), (948, 0x7abf_e695));
 }
