@@ -42,6 +42,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rustc-link-arg-bins=--nmagic");
     // A fault on the emulated board shall end it. A jump to 0 (not a Thumb address) inside the handler locks the core up: QEMU
     // then prints the registers and aborts. A handler in Rust would have to be an `unsafe fn`.
-    println!("cargo::rustc-link-arg-bin=netduinoplus2=--defsym=HardFault=0");
+    for bin in ["netduinoplus2", "kernels"] {
+        println!("cargo::rustc-link-arg-bin={bin}=--defsym=HardFault=0");
+    }
     Ok(())
 }

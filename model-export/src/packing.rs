@@ -1,6 +1,9 @@
 //! Layers in the order in which the kernels stream them ([`impromptu_firmware::network::kernel`]).
 
-use impromptu_firmware::network::{ROWS, kernel::Width, kernel::portable::pair};
+use impromptu_firmware::network::{
+    ROWS,
+    kernel::{Width, float_blocks, float_rows, portable::pair},
+};
 
 use crate::quantise::IntegerLayer;
 
@@ -11,8 +14,11 @@ const FLOAT_PADDING: usize = 2;
 pub fn float(weights: &[f32], bias: &[f32], inputs: usize) -> Vec<u32> {
     let outputs = bias.len();
     let mut words = Vec::new();
-    for block in (0..outputs).step_by(ROWS) {
-        let rows = block..block + ROWS;
+    let [twelves, eights] = float_blocks(float_rows(outputs)).unwrap_or_default();
+    let mut start = 0;
+    for height in std::iter::repeat_n(12, twelves).chain(std::iter::repeat_n(8, eights)) {
+        let rows = start..start + height;
+        start += height;
         words.extend(rows.clone().map(|row| bias.get(row).copied().unwrap_or(0.0).to_bits()));
         for input in 0..inputs.next_multiple_of(FLOAT_PADDING) {
             let weight = |row: usize| if row < outputs && input < inputs { weights[row * inputs + input] } else { 0.0 };

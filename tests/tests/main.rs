@@ -4,7 +4,9 @@
 //! - [`board`]: whole flights on the emulated microcontroller, bit by bit, with golden instruction counts;
 //! - [`decoder`]: mutated model files are refused or flown, never a panic;
 //! - [`emulator`]: the emulator is found, fails loudly, and counts repeatably;
-//! - [`mcu`]: what kernels cost on the microcontroller, beside other engines, with a golden table.
+//! - [`mcu`]: what kernels cost on the microcontroller, beside other engines, with a golden table;
+//! - [`kernels`]: the network kernels in assembly give the bits of their portable twin;
+//! - [`unsafe_code`]: there is none but those kernels, each block with its reason.
 //!
 //! The parts have tests of their own: plant against an independent simulator and every generator and parser in `host-sim`, model
 //! files bit by bit damaged in `model-export`, kernels and values in `firmware`.
@@ -13,4 +15,6 @@ mod board;
 mod decoder;
 mod demo;
 mod emulator;
+mod kernels;
 mod mcu;
+mod unsafe_code;

@@ -8,17 +8,17 @@
 //! Eight accumulators in r6-r12 and lr; r4 streams the weights, r5 the inputs; r0-r3 hold an input word and weights, or two input
 //! words while one gives way to the next. What a block needs only once waits in s0-s6 (1 cycle to fetch). Account for int8, of
 //! 4 inputs × 8 rows = 32 multiplications: 16 SMLAD, 8 LSL, 8 + 2 words loaded in three runs: 16 + 8 + 10 + 3 = 37 cycles; int16:
-//! 16 + 18 + 6 = 40. Five chunks are unrolled; their number's remainder decides where the first pass enters. A block adds about 67: 9 biases, 10 multipliers, 24 SMMLAR, USAT, PKHBT and UQSUB16, the rest control.
+//! 16 + 18 + 6 = 40. Five chunks are unrolled; their number's remainder decides where the first pass enters. A block adds about 65: 9 biases, 10 multipliers, 24 SMMLAR, USAT, PKHBT and UQSUB16, the rest control.
 //!
 //! # Floats
-//! Eight accumulators in s0-s7, two inputs' weights in s8-s23, eight inputs in s24-s31. Eight inputs × 8 rows: 64 VMUL, 64 VADD,
-//! 4 × 17 + 9 cycles of VLDM: 205. No result is used by the next instruction, which would stall.
+//! Twelve accumulators in s0-s11, an input's weights in s12-s23, eight inputs in s24-s31. Eight inputs × 12 rows: 96 VMUL, 96 VADD,
+//! 8 × 13 + 9 cycles of VLDM: 305. What rows are left go by eight: accumulators in s0-s7, two inputs' weights in s8-s23; eight inputs:
+//! 64 + 64 + 4 × 17 + 9 = 205. No result is used by the next instruction, which would stall.
 #![allow(unsafe_code)]
 
 use core::arch::naked_asm;
 
-use super::{Finish, Width};
-use crate::network::ROWS;
+use super::{Finish, Width, float_blocks};
 
 /// Chunks of four inputs in the unrolled integer loops.
 const UNROLLED: usize = 5;
@@ -92,25 +92,25 @@ macro_rules! two_rows {
     };
 }
 
-/// Four inputs, eight rows, bytes. r4 points at the last word that was used.
+/// Four inputs, eight rows, bytes. r4 moves on with the first load.
 macro_rules! int8_chunk {
     () => {
         concat!(
             "ldr.w r0, [r5], #4\n",
-            "ldr.w r1, [r4, #4]\n",
-            "ldr.w r2, [r4, #8]\n",
-            "ldr.w r3, [r4, #12]\n",
+            "ldr.w r1, [r4], #32\n",
+            "ldr r2, [r4, #-28]\n",
+            "ldr r3, [r4, #-24]\n",
             two_rows!("r1", "r0", "r6", "r7"),
             two_rows!("r2", "r0", "r8", "r9"),
             two_rows!("r3", "r0", "r10", "r11"),
-            "ldr.w r1, [r4, #16]\n",
+            "ldr r1, [r4, #-20]\n",
             "ldr.w r2, [r5], #4\n",
-            "ldr.w r3, [r4, #20]\n",
+            "ldr r3, [r4, #-16]\n",
             two_rows!("r1", "r0", "r12", "lr"),
             two_rows!("r3", "r2", "r6", "r7"),
-            "ldr.w r0, [r4, #24]\n",
-            "ldr.w r1, [r4, #28]\n",
-            "ldr.w r3, [r4, #32]!\n",
+            "ldr r0, [r4, #-12]\n",
+            "ldr r1, [r4, #-8]\n",
+            "ldr r3, [r4, #-4]\n",
             two_rows!("r0", "r2", "r8", "r9"),
             two_rows!("r1", "r2", "r10", "r11"),
             two_rows!("r3", "r2", "r12", "lr"),
@@ -125,42 +125,42 @@ macro_rules! one_row {
     };
 }
 
-/// Four inputs, eight rows, halves. r4 points at the last word that was used.
+/// Four inputs, eight rows, halves. r4 moves on with the first load.
 macro_rules! int16_chunk {
     () => {
         concat!(
             "ldr.w r0, [r5], #4\n",
-            "ldr.w r1, [r4, #4]\n",
-            "ldr.w r2, [r4, #8]\n",
-            "ldr.w r3, [r4, #12]\n",
+            "ldr.w r1, [r4], #64\n",
+            "ldr r2, [r4, #-60]\n",
+            "ldr r3, [r4, #-56]\n",
             one_row!("r1", "r0", "r6"),
             one_row!("r2", "r0", "r7"),
             one_row!("r3", "r0", "r8"),
-            "ldr.w r1, [r4, #16]\n",
-            "ldr.w r2, [r4, #20]\n",
-            "ldr.w r3, [r4, #24]\n",
+            "ldr r1, [r4, #-52]\n",
+            "ldr r2, [r4, #-48]\n",
+            "ldr r3, [r4, #-44]\n",
             one_row!("r1", "r0", "r9"),
             one_row!("r2", "r0", "r10"),
             one_row!("r3", "r0", "r11"),
-            "ldr.w r1, [r4, #28]\n",
-            "ldr.w r2, [r4, #32]\n",
+            "ldr r1, [r4, #-40]\n",
+            "ldr r2, [r4, #-36]\n",
             "ldr.w r3, [r5], #4\n",
             one_row!("r1", "r0", "r12"),
             one_row!("r2", "r0", "lr"),
-            "ldr.w r0, [r4, #36]\n",
-            "ldr.w r1, [r4, #40]\n",
-            "ldr.w r2, [r4, #44]\n",
+            "ldr r0, [r4, #-32]\n",
+            "ldr r1, [r4, #-28]\n",
+            "ldr r2, [r4, #-24]\n",
             one_row!("r0", "r3", "r6"),
             one_row!("r1", "r3", "r7"),
             one_row!("r2", "r3", "r8"),
-            "ldr.w r0, [r4, #48]\n",
-            "ldr.w r1, [r4, #52]\n",
-            "ldr.w r2, [r4, #56]\n",
+            "ldr r0, [r4, #-20]\n",
+            "ldr r1, [r4, #-16]\n",
+            "ldr r2, [r4, #-12]\n",
             one_row!("r0", "r3", "r9"),
             one_row!("r1", "r3", "r10"),
             one_row!("r2", "r3", "r11"),
-            "ldr.w r0, [r4, #60]\n",
-            "ldr.w r1, [r4, #64]!\n",
+            "ldr r0, [r4, #-8]\n",
+            "ldr r1, [r4, #-4]\n",
             one_row!("r0", "r3", "r12"),
             one_row!("r1", "r3", "lr"),
         )
@@ -187,10 +187,9 @@ macro_rules! integer_kernel {
             "vmov s6, r10",
             // A block: biases, and into the loop.
             "20:",
-            "ldm.w r4, {{r6-r12, lr}}",
+            "ldm.w r4!, {{r6-r12, lr}}",
             "vmov r5, s0",
             "vmov r0, s2",
-            "add.w r4, r4, #28",
             "bx r0",
             ".balign 4",
             "10:",
@@ -207,7 +206,6 @@ macro_rules! integer_kernel {
             "cmp.w r5, r0",
             "bne.w 10b",
             "vmov r5, s5",
-            "add.w r4, r4, #4",
             "cmp.w r5, #1",
             "bls.w 40f",
             // ReLU: with the offset, 16 unsigned bits saturate at the limit; taking it away saturates at 0.
@@ -309,81 +307,101 @@ struct Float {
     stream: *const [u8; 4],
     inputs: *const u32,
     outputs: *mut u32,
-    outputs_end: *const u32,
-    /// Behind the last whole group of eight inputs.
-    groups_end: *const u32,
+    /// Behind the outputs of the blocks of twelve rows.
+    twelves_end: *const u32,
+    /// Pairs of inputs that are not in whole groups of eight: 0 to 3.
+    pairs: usize,
     inputs_end: *const u32,
     /// 0: ReLU.
     linear: u32,
+    outputs_end: *const u32,
 }
 
 /// [`super::float`], if the arguments suit the kernel; else `false` and nothing has been done.
 pub(super) fn float(stream: &[[u8; 4]], inputs: &[u32], relu: bool, outputs: &mut [u32]) -> bool {
-    let blocks = outputs.len() / ROWS;
+    let Some([twelves, _]) = float_blocks(outputs.len()) else { return false };
     let pairs = !inputs.is_empty() && inputs.len().is_multiple_of(2);
-    let whole = outputs.len() == blocks * ROWS && blocks > 0;
-    if !(whole && pairs && aligned(stream) && stream.len() == blocks * ROWS * (1 + inputs.len())) {
+    if !(pairs && aligned(stream) && stream.len() == outputs.len() * (1 + inputs.len())) {
         return false;
     }
-    let groups = inputs.as_chunks::<8>().0.as_ptr_range();
+    let left = inputs.len() % 8 / 2;
     let (inputs, outputs) = (inputs.as_ptr_range(), outputs.as_mut_ptr_range());
     let arguments = Float {
         stream: stream.as_ptr(),
         inputs: inputs.start,
         outputs: outputs.start,
-        outputs_end: outputs.end,
-        groups_end: groups.end.cast(),
+        twelves_end: outputs.start.wrapping_add(twelves * 12),
+        pairs: left,
         inputs_end: inputs.end,
         linear: u32::from(!relu),
+        outputs_end: outputs.end,
     };
-    // SAFETY: the pointers come from live slices, `stream` is aligned to words, and the three lengths fit together (checked above): the
-    // kernel reads exactly `blocks` blocks of the stream and, for each, all of `inputs` (whole groups of eight, then pairs); it writes
-    // exactly `outputs`. It keeps the registers that the calling convention protects.
+    // SAFETY: the pointers come from live slices, `stream` is aligned to words, and the three lengths fit together (checked above):
+    // `outputs` is exactly `twelves` blocks of twelve and the rest of eight rows, for each of which the kernel reads its part of the stream
+    // and all of `inputs` (`pairs` pairs, then whole groups of eight). It writes exactly `outputs` and keeps the registers that the calling
+    // convention protects.
     unsafe { float_kernel(&arguments) };
     true
 }
 
-/// Two inputs, eight rows: `$first` and `$second` hold the inputs.
-macro_rules! float_step {
-    ($first:literal, $second:literal) => {
+/// Instructions of three operands.
+macro_rules! each {
+    ($($operation:literal $a:literal $b:literal $c:literal;)*) => {
+        concat!($($operation, " ", $a, ", ", $b, ", ", $c, "\n"),*)
+    };
+}
+
+/// One input, twelve rows: `$input` holds the input.
+macro_rules! float_twelve {
+    ($input:literal) => {
         concat!(
-            "vldm r0!, {{s8-s23}}\n",
-            float_products!($first, "s8" "s9" "s10" "s11" "s12" "s13" "s14" "s15"),
-            float_sums!("s8" "s9" "s10" "s11" "s12" "s13" "s14" "s15"),
-            float_products!($second, "s16" "s17" "s18" "s19" "s20" "s21" "s22" "s23"),
-            float_sums!("s16" "s17" "s18" "s19" "s20" "s21" "s22" "s23"),
+            "vldm r0!, {{s12-s23}}\n",
+            each!("vmul.f32" "s12" "s12" $input; "vmul.f32" "s13" "s13" $input; "vmul.f32" "s14" "s14" $input;
+                "vmul.f32" "s15" "s15" $input; "vmul.f32" "s16" "s16" $input; "vmul.f32" "s17" "s17" $input;
+                "vmul.f32" "s18" "s18" $input; "vmul.f32" "s19" "s19" $input; "vmul.f32" "s20" "s20" $input;
+                "vmul.f32" "s21" "s21" $input; "vmul.f32" "s22" "s22" $input; "vmul.f32" "s23" "s23" $input;
+                "vadd.f32" "s0" "s0" "s12"; "vadd.f32" "s1" "s1" "s13"; "vadd.f32" "s2" "s2" "s14";
+                "vadd.f32" "s3" "s3" "s15"; "vadd.f32" "s4" "s4" "s16"; "vadd.f32" "s5" "s5" "s17";
+                "vadd.f32" "s6" "s6" "s18"; "vadd.f32" "s7" "s7" "s19"; "vadd.f32" "s8" "s8" "s20";
+                "vadd.f32" "s9" "s9" "s21"; "vadd.f32" "s10" "s10" "s22"; "vadd.f32" "s11" "s11" "s23";),
         )
     };
 }
 
-/// Weights times an input, in place.
-macro_rules! float_products {
-    ($input:literal, $($weight:literal)*) => {
-        concat!($("vmul.f32 ", $weight, ", ", $weight, ", ", $input, "\n"),*)
+/// Two inputs, eight rows: `$first` and `$second` hold the inputs.
+macro_rules! float_eight {
+    ($first:literal, $second:literal) => {
+        concat!(
+            "vldm r0!, {{s8-s23}}\n",
+            each!("vmul.f32" "s8" "s8" $first; "vmul.f32" "s9" "s9" $first; "vmul.f32" "s10" "s10" $first;
+                "vmul.f32" "s11" "s11" $first; "vmul.f32" "s12" "s12" $first; "vmul.f32" "s13" "s13" $first;
+                "vmul.f32" "s14" "s14" $first; "vmul.f32" "s15" "s15" $first;
+                "vadd.f32" "s0" "s0" "s8"; "vadd.f32" "s1" "s1" "s9"; "vadd.f32" "s2" "s2" "s10"; "vadd.f32" "s3" "s3" "s11";
+                "vadd.f32" "s4" "s4" "s12"; "vadd.f32" "s5" "s5" "s13"; "vadd.f32" "s6" "s6" "s14"; "vadd.f32" "s7" "s7" "s15";
+                "vmul.f32" "s16" "s16" $second; "vmul.f32" "s17" "s17" $second; "vmul.f32" "s18" "s18" $second;
+                "vmul.f32" "s19" "s19" $second; "vmul.f32" "s20" "s20" $second; "vmul.f32" "s21" "s21" $second;
+                "vmul.f32" "s22" "s22" $second; "vmul.f32" "s23" "s23" $second;
+                "vadd.f32" "s0" "s0" "s16"; "vadd.f32" "s1" "s1" "s17"; "vadd.f32" "s2" "s2" "s18"; "vadd.f32" "s3" "s3" "s19";
+                "vadd.f32" "s4" "s4" "s20"; "vadd.f32" "s5" "s5" "s21"; "vadd.f32" "s6" "s6" "s22"; "vadd.f32" "s7" "s7" "s23";),
+        )
     };
 }
 
-/// Adds eight products to the accumulators.
-macro_rules! float_sums {
-    ($a:literal $b:literal $c:literal $d:literal $e:literal $f:literal $g:literal $h:literal) => {
+/// ReLU of four accumulators, stored.
+macro_rules! float_relu {
+    ($a:literal, $b:literal, $c:literal, $d:literal) => {
         concat!(
-            "vadd.f32 s0, s0, ",
+            "vmov r4, ",
             $a,
-            "\nvadd.f32 s1, s1, ",
+            "\nvmov r5, ",
             $b,
-            "\nvadd.f32 s2, s2, ",
+            "\nvmov r6, ",
             $c,
-            "\nvadd.f32 s3, s3, ",
+            "\nvmov r7, ",
             $d,
-            "\nvadd.f32 s4, s4, ",
-            $e,
-            "\nvadd.f32 s5, s5, ",
-            $f,
-            "\nvadd.f32 s6, s6, ",
-            $g,
-            "\nvadd.f32 s7, s7, ",
-            $h,
             "\n",
+            "bic r4, r4, r4, asr #31\nbic r5, r5, r5, asr #31\nbic r6, r6, r6, asr #31\nbic r7, r7, r7, asr #31\n",
+            "stm.w r2!, {{r4-r7}}\n",
         )
     };
 }
@@ -395,60 +413,104 @@ unsafe extern "C" fn float_kernel(arguments: &Float) {
     naked_asm!(
         ".arch armv7e-m",
         ".fpu fpv4-sp-d16",
-        "push {{r4-r10, lr}}",
-        "vpush {{s16-s31}}",
-        "ldm r0, {{r0-r3, r8-r10}}",
-        "20:",
-        "vldm r0!, {{s0-s7}}",
-        "mov r12, r1",
-        "cmp r12, r8",
-        "beq 12f",
         ".balign 4",
+        "push {{r4-r11, lr}}",
+        "vpush {{s16-s31}}",
+        "ldm.w r0, {{r0-r3, r8-r11}}",
+        "cmp.w r2, r3",
+        "beq.w 50f",
+        "adr.w r4, 90f",
+        "ldr.w lr, [r4, r8, lsl #2]",
+        // Blocks of twelve rows: biases, pairs of inputs on the way into the loop, groups of eight inputs.
+        "20:",
+        "vldm r0!, {{s0-s11}}",
+        "mov.w r12, r1",
+        "bx lr",
+        ".balign 4",
+        "21:",
+        "vldm r12!, {{s26-s31}}",
+        "b.w 11f",
+        "22:",
+        "vldm r12!, {{s28-s31}}",
+        "b.w 12f",
+        "23:",
+        "vldm r12!, {{s30-s31}}",
+        "b.w 13f",
         "10:",
         "vldm r12!, {{s24-s31}}",
-        float_step!("s24", "s25"),
-        float_step!("s26", "s27"),
-        float_step!("s28", "s29"),
-        float_step!("s30", "s31"),
-        "cmp r12, r8",
-        "bne.w 10b",
+        float_twelve!("s24"),
+        float_twelve!("s25"),
+        "11:",
+        float_twelve!("s26"),
+        float_twelve!("s27"),
         "12:",
-        "cmp r12, r9",
-        "bne 30f",
+        float_twelve!("s28"),
+        float_twelve!("s29"),
         "13:",
-        "cmp r10, #0",
-        "bne 40f",
-        "vmov r4, s0",
-        "vmov r5, s1",
-        "vmov r6, s2",
-        "vmov r7, s3",
-        "bic r4, r4, r4, asr #31",
-        "bic r5, r5, r5, asr #31",
-        "bic r6, r6, r6, asr #31",
-        "bic r7, r7, r7, asr #31",
-        "stm r2!, {{r4-r7}}",
-        "vmov r4, s4",
-        "vmov r5, s5",
-        "vmov r6, s6",
-        "vmov r7, s7",
-        "bic r4, r4, r4, asr #31",
-        "bic r5, r5, r5, asr #31",
-        "bic r6, r6, r6, asr #31",
-        "bic r7, r7, r7, asr #31",
-        "stm r2!, {{r4-r7}}",
+        float_twelve!("s30"),
+        float_twelve!("s31"),
+        "cmp.w r12, r9",
+        "bne.w 10b",
+        "cmp.w r10, #0",
+        "bne.w 40f",
+        float_relu!("s0", "s1", "s2", "s3"),
+        float_relu!("s4", "s5", "s6", "s7"),
+        float_relu!("s8", "s9", "s10", "s11"),
         "14:",
-        "cmp r2, r3",
+        "cmp.w r2, r3",
         "bne.w 20b",
+        // Blocks of eight rows, in the same way.
+        "50:",
+        "mov.w r3, r11",
+        "cmp.w r2, r3",
+        "beq.w 59f",
+        "adr.w r4, 91f",
+        "ldr.w lr, [r4, r8, lsl #2]",
+        "60:",
+        "vldm r0!, {{s0-s7}}",
+        "mov.w r12, r1",
+        "bx lr",
+        ".balign 4",
+        "61:",
+        "vldm r12!, {{s26-s31}}",
+        "b.w 71f",
+        "62:",
+        "vldm r12!, {{s28-s31}}",
+        "b.w 72f",
+        "63:",
+        "vldm r12!, {{s30-s31}}",
+        "b.w 73f",
+        "70:",
+        "vldm r12!, {{s24-s31}}",
+        float_eight!("s24", "s25"),
+        "71:",
+        float_eight!("s26", "s27"),
+        "72:",
+        float_eight!("s28", "s29"),
+        "73:",
+        float_eight!("s30", "s31"),
+        "cmp.w r12, r9",
+        "bne.w 70b",
+        "cmp.w r10, #0",
+        "bne.w 80f",
+        float_relu!("s0", "s1", "s2", "s3"),
+        float_relu!("s4", "s5", "s6", "s7"),
+        "54:",
+        "cmp.w r2, r3",
+        "bne.w 60b",
+        "59:",
         "vpop {{s16-s31}}",
-        "pop {{r4-r10, pc}}",
-        "30:",
-        "vldm r12!, {{s24-s25}}",
-        float_step!("s24", "s25"),
-        "cmp r12, r9",
-        "bne 30b",
-        "b 13b",
+        "pop {{r4-r11, pc}}",
         "40:",
+        "vstm r2!, {{s0-s11}}",
+        "b.w 14b",
+        "80:",
         "vstm r2!, {{s0-s7}}",
-        "b 14b",
+        "b.w 54b",
+        ".balign 4",
+        "90:",
+        ".word 10b + 1, 23b + 1, 22b + 1, 21b + 1",
+        "91:",
+        ".word 70b + 1, 63b + 1, 62b + 1, 61b + 1",
     )
 }

@@ -1,6 +1,6 @@
 //! Dense layers in f32.
 
-use super::{Activation, ROWS, kernel, padded, tanh::tanh};
+use super::{Activation, ROWS, kernel, tanh::tanh};
 use crate::model::{Blob, LayerLayout, MAX_OUTPUTS, Refusal, Section, Words};
 
 /// Inputs are padded to a multiple of this.
@@ -33,12 +33,13 @@ impl<'a> Layer<'a> {
         activation: Activation,
         what: &'static str,
     ) -> Result<Self, Refusal> {
-        let (inputs, outputs) = (inputs.next_multiple_of(PADDING), padded(outputs));
+        let (inputs, outputs) = (inputs.next_multiple_of(PADDING), kernel::float_rows(outputs));
         blob.floats(section, outputs * (1 + inputs), what)?;
         let stream = blob.words(section, outputs * (1 + inputs), what)?;
         Ok(Self { stream, inputs: inputs as u16, outputs: outputs as u16, activation })
     }
 
+    #[inline(never)]
     fn hidden(&self, inputs: &[u32], outputs: &mut [u32]) {
         let (Some(inputs), Some(outputs)) = (inputs.get(..self.inputs.into()), outputs.get_mut(..self.outputs.into())) else {
             return;
@@ -49,13 +50,16 @@ impl<'a> Layer<'a> {
         }
     }
 
-    /// The outputs of the last layer, or of the skip.
-    pub(super) fn outputs(&self, inputs: &[u32]) -> [f32; MAX_OUTPUTS] {
+    /// Adds the outputs of the last layer, or of the skip.
+    #[inline(never)]
+    pub(super) fn outputs(&self, inputs: &[u32], result: &mut [f32; MAX_OUTPUTS]) {
         let mut outputs = [0; ROWS];
         if let Some(inputs) = inputs.get(..self.inputs.into()) {
             kernel::float(self.stream.all(), inputs, false, &mut outputs);
         }
-        outputs.map(f32::from_bits)
+        for (result, output) in result.iter_mut().zip(outputs) {
+            *result += f32::from_bits(output);
+        }
     }
 }
 
@@ -71,7 +75,5 @@ pub(super) fn evaluate<'s>(
         layer.hidden(current, other);
         core::mem::swap(&mut current, &mut other);
     }
-    for (result, output) in result.iter_mut().zip(last.outputs(current)) {
-        *result += output;
-    }
+    last.outputs(current, result);
 }

@@ -19,12 +19,18 @@ pub(super) struct Layer<'a> {
     stream: Words<'a>,
     /// Words of a row's inputs.
     inputs: u16,
-    /// Words of its outputs, as codes.
+    /// Words of its outputs, as codes, and how many of them the next layer reads.
     outputs: u16,
+    read: u16,
     activation: Activation,
     /// Largest code of its inputs and of its outputs.
     limits: [u16; 2],
+    /// For tanh.
+    factor: i32,
 }
+
+/// Biases, weights and requantisation of eight rows.
+type Block<'a> = (&'a [[u8; 4]; ROWS], &'a [[u8; 4]], &'a [[u8; 4]; ROWS]);
 
 impl<'a> Layer<'a> {
     /// Checks layer `index`; `before` is the activation that gives its inputs, `next_limit` the limit of the codes that it gives.
@@ -40,6 +46,7 @@ impl<'a> Layer<'a> {
         if limit == 0 || limit > i16::MAX as u16 {
             return Err(Refusal::Value { what: "largest input code" });
         }
+        let next_limit = next.map_or(0, |next| next.input_limit);
         let inputs = usize::from(layout.inputs).next_multiple_of(INPUT_PADDING) / 2;
         let rows = padded(layout.outputs.into());
         let layer = Self {
@@ -47,8 +54,10 @@ impl<'a> Layer<'a> {
             stream: blob.words(layout.rows, rows / ROWS * width.block(inputs), "layer rows")?,
             inputs: inputs as u16,
             outputs: (rows / 2) as u16,
+            read: (usize::from(layout.outputs).next_multiple_of(INPUT_PADDING) / 2) as u16,
             activation: layout.activation,
-            limits: [limit, next.map_or(0, |next| next.input_limit)],
+            limits: [limit, next_limit],
+            factor: code_factor(next_limit),
         };
         layer.refuse_overflow(index, before)?;
         if next.is_none()
@@ -59,8 +68,7 @@ impl<'a> Layer<'a> {
         Ok(layer)
     }
 
-    /// Biases, weights and requantisation of each block of rows.
-    fn blocks(&self) -> impl Iterator<Item = (&'a [[u8; 4]; ROWS], &'a [[u8; 4]], &'a [[u8; 4]; ROWS])> + use<'a> {
+    fn blocks(&self) -> impl Iterator<Item = Block<'a>> + use<'a> {
         self.stream.chunks(self.width.block(self.inputs.into())).filter_map(|block| {
             let (bias, rest) = block.split_first_chunk()?;
             let (weights, requantisation) = rest.split_last_chunk()?;
@@ -105,6 +113,7 @@ impl<'a> Layer<'a> {
         Ok(())
     }
 
+    #[inline(never)]
     fn hidden(&self, codes: &[u32], outputs: &mut [u32]) {
         let limit = self.limits[1];
         let (Some(codes), Some(outputs)) = (codes.get(..self.inputs.into()), outputs.get_mut(..self.outputs.into())) else {
@@ -115,11 +124,12 @@ impl<'a> Layer<'a> {
             Activation::Tanh | Activation::Linear => Finish::Preactivations,
         };
         kernel::integer(self.width, self.stream.all(), codes, finish, outputs);
+        let outputs = outputs.get_mut(..self.read.into()).unwrap_or_default();
         match self.activation {
             Activation::Relu => {}
             Activation::Tanh => {
-                let factor = code_factor(limit);
-                each_code(outputs, |code| scaled_tanh(code, factor));
+                let factor = self.factor;
+                each_code(outputs, |code| scaled_tanh(code as u16, factor));
             }
             Activation::Linear => {
                 let limit = limit as i16;
@@ -136,6 +146,7 @@ impl<'a> Layer<'a> {
         }
     }
 
+    #[inline(never)]
     fn last(&self, codes: &[u32], result: &mut [f32; MAX_OUTPUTS]) {
         let mut sums = [0; MAX_OUTPUTS];
         let Some(codes) = codes.get(..self.inputs.into()) else { return };
@@ -160,14 +171,19 @@ const ROUNDING: f32 = 12_582_912.0;
 
 /// The nearest integer, halves to the even one, within ±`limit`. Not a number gives either limit.
 #[inline(always)]
-pub(super) fn code(value: f32, limit: i32) -> i16 {
+fn code(value: f32, limit: i32) -> i16 {
     let integer = ((value + ROUNDING).to_bits() as i32).saturating_sub(ROUNDING.to_bits() as i32);
     integer.clamp(-limit, limit) as i16
 }
 
-/// The first layer's largest code.
-pub(super) fn input_limit(layers: &[Layer<'_>]) -> i32 {
-    layers.first().map_or(0, |layer| i32::from(layer.limits[0]))
+/// Makes codes of `count` normalised inputs (f32, padded with zeros): `factor` is the code of 1.
+#[inline(never)]
+pub(super) fn encode(normalised: &[u32], count: usize, factor: f32, layers: &[Layer<'_>], codes: &mut [u32]) {
+    let limit = layers.first().map_or(0, |layer| i32::from(layer.limits[0]));
+    let pairs = normalised.get(..count.next_multiple_of(INPUT_PADDING)).unwrap_or_default().as_chunks::<2>().0;
+    for (word, [low, high]) in codes.iter_mut().zip(pairs) {
+        *word = portable::pair(code(f32::from_bits(*low) * factor, limit), code(f32::from_bits(*high) * factor, limit));
+    }
 }
 
 /// Runs the layers on the input codes in `current`; adds to `result`.

@@ -117,6 +117,7 @@ impl<'a> Network<'a> {
         self.run(inputs, outputs, scratch.words());
     }
 
+    // Its parts are functions of their own so that their stacks are not added up.
     #[inline(never)]
     fn run(&self, inputs: &[f32], outputs: &mut [f32], scratch: &mut [u32]) {
         let (Some((front, rest)), Some(inputs)) = (scratch.split_at_mut_checked(self.half), inputs.get(..self.mean.len())) else {
@@ -126,52 +127,43 @@ impl<'a> Network<'a> {
         let mut result = [0.0; MAX_OUTPUTS];
         match &self.layers {
             Layers::Float(layers) => {
-                self.normalise(inputs, front, |_, _| ());
-                if let Some(skip) = &self.skip {
-                    result = skip.outputs(front);
-                }
+                self.normalise(inputs, front);
+                self.skip(front, &mut result);
                 float::evaluate(layers, front, back, &mut result);
             }
             Layers::Integer { code, layers } => {
-                let limit = integer::input_limit(layers);
-                let normalised = if self.skip.is_some() { &mut *back } else { &mut [] };
-                self.normalise(inputs, normalised, |index, value| {
-                    let code = integer::code(value * code, limit);
-                    if let Some(word) = front.get_mut(index / 2) {
-                        let other = kernel::portable::halves(*word)[0];
-                        *word =
-                            if index % 2 == 0 { kernel::portable::pair(code, 0) } else { kernel::portable::pair(other, code) };
-                    }
-                });
-                let words = inputs.len().div_ceil(2);
-                if let Some(padding) = front.get_mut(words..words.next_multiple_of(INPUT_PADDING / 2)) {
-                    padding.fill(0);
-                }
-                if let Some(skip) = &self.skip {
-                    result = skip.outputs(back);
-                }
+                self.normalise(inputs, back);
+                integer::encode(back, inputs.len(), *code, layers, front);
+                self.skip(back, &mut result);
                 integer::evaluate(layers, front, back, &mut result);
             }
         }
-        let denormalisation = self.output_scale.iter().zip(self.output_mean.iter());
-        for ((output, value), (scale, mean)) in outputs.iter_mut().zip(result).zip(denormalisation) {
-            *output = value * scale + mean;
+        self.denormalise(&result, outputs);
+    }
+
+    /// Normalises the inputs into `words`, padded with zeros.
+    #[inline(never)]
+    fn normalise(&self, inputs: &[f32], words: &mut [u32]) {
+        let normalisation = self.mean.iter().zip(self.reciprocal_scale.iter());
+        for ((word, input), (mean, reciprocal)) in words.iter_mut().zip(inputs).zip(normalisation) {
+            *word = ((*input - mean) * reciprocal).to_bits();
+        }
+        let padding = words.iter_mut().skip(inputs.len());
+        padding.take(inputs.len().wrapping_neg() % INPUT_PADDING).for_each(|word| *word = 0);
+    }
+
+    #[inline(never)]
+    fn skip(&self, normalised: &[u32], result: &mut [f32; MAX_OUTPUTS]) {
+        if let Some(skip) = &self.skip {
+            skip.outputs(normalised, result);
         }
     }
 
-    /// Normalises the inputs into `words` (padded with zero to an even number), if there is room, and shows each to `also`.
-    #[inline(always)]
-    fn normalise(&self, inputs: &[f32], words: &mut [u32], mut also: impl FnMut(usize, f32)) {
-        let normalisation = self.mean.iter().zip(self.reciprocal_scale.iter());
-        for (index, (input, (mean, reciprocal))) in inputs.iter().zip(normalisation).enumerate() {
-            let value = (*input - mean) * reciprocal;
-            if let Some(word) = words.get_mut(index) {
-                *word = value.to_bits();
-            }
-            also(index, value);
-        }
-        if let Some(word) = words.get_mut(inputs.len()) {
-            *word = 0;
+    #[inline(never)]
+    fn denormalise(&self, result: &[f32; MAX_OUTPUTS], outputs: &mut [f32]) {
+        let denormalisation = self.output_scale.iter().zip(self.output_mean.iter());
+        for ((output, value), (scale, mean)) in outputs.iter_mut().zip(result).zip(denormalisation) {
+            *output = value * scale + mean;
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The kernels in safe Rust, for every machine: the definition of the bits that the assembly must give.
 
-use super::{Finish, Width};
+use super::{Finish, Width, float_blocks};
 use crate::network::ROWS;
 
 /// Upper bits of accumulator × multiplier + 2³¹.
@@ -78,11 +78,19 @@ fn multiply_add(weights: [i16; 2], input: u32, sum: i32) -> i32 {
 
 /// [`super::float`] on any machine.
 pub fn float(stream: &[[u8; 4]], inputs: &[u32], relu: bool, outputs: &mut [u32]) {
-    let blocks = stream.chunks_exact(ROWS * (1 + inputs.len()));
-    for (block, outputs) in blocks.zip(outputs.as_chunks_mut::<ROWS>().0) {
-        let Some((bias, weights)) = block.split_first_chunk::<ROWS>() else { return };
+    let Some([twelves, _]) = float_blocks(outputs.len()) else { return };
+    let (first, rest) = outputs.split_at_mut(12 * twelves);
+    let Some((first_stream, rest_stream)) = stream.split_at_checked(12 * twelves * (1 + inputs.len())) else { return };
+    float_part::<12>(first_stream, inputs, relu, first);
+    float_part::<8>(rest_stream, inputs, relu, rest);
+}
+
+/// The blocks of `N` rows.
+fn float_part<const N: usize>(stream: &[[u8; 4]], inputs: &[u32], relu: bool, outputs: &mut [u32]) {
+    for (block, outputs) in stream.chunks_exact(N * (1 + inputs.len())).zip(outputs.as_chunks_mut::<N>().0) {
+        let Some((bias, weights)) = block.split_first_chunk::<N>() else { return };
         let mut sums = bias.map(f32::from_le_bytes);
-        for (weights, &input) in weights.as_chunks::<ROWS>().0.iter().zip(inputs) {
+        for (weights, &input) in weights.as_chunks::<N>().0.iter().zip(inputs) {
             let input = f32::from_bits(input);
             for (sum, weight) in sums.iter_mut().zip(weights) {
                 *sum += f32::from_le_bytes(*weight) * input;

@@ -42,13 +42,8 @@ impl<const WORDS: usize> Default for Scratch<WORDS> {
 
 /// Words of the activations of the widest layer of a checked network, the inputs included.
 pub(super) fn half(layout: &NetworkLayout, inputs: usize) -> usize {
-    let padded_inputs = inputs.next_multiple_of(INPUT_PADDING);
-    let (codes, skip) = match layout.arithmetic {
-        Arithmetic::Float => (1, 0),
-        Arithmetic::Int16 | Arithmetic::Int8 => (2, layout.skip.length),
-    };
-    // Beside integer layers, the skip's inputs wait in the half into which the first layer will write.
-    let normalised = if skip > 0 || layout.layers.is_empty() { padded_inputs } else { 0 };
+    // The normalised inputs are f32 in any arithmetic; integer layers take two outputs to a word.
+    let codes = if layout.arithmetic == Arithmetic::Float { 1 } else { 2 };
     let hidden = layout.layers.iter().rev().skip(1).map(|layer| padded(usize::from(layer.outputs)) / codes);
-    hidden.fold(normalised.max(padded_inputs / codes), usize::max)
+    hidden.fold(inputs.next_multiple_of(INPUT_PADDING), usize::max)
 }

@@ -1,4 +1,8 @@
-//! Rounding as an exporter does it, for the forward pass of quantisation-aware training.
+//! Plain rounding to integers, for the forward pass of quantisation-aware training.
+//!
+//! The exporter has the same step for each row, but rounds more cleverly (`impromptu_model_export::quantise`): an error in one column is made
+//! good by the columns to come, and a packed weight carries a known fraction of a step. So training sees about the noise that export brings,
+//! somewhat more of it at the outputs, and never the very numbers that are flown.
 //!
 //! Weights: int8, symmetric, one scale for each output row: `scale = max|w| / 127` (1 for a row of zeros), number =
 //! `w / scale` rounded half away from zero. Activations: a signed integer of n bits with one scale for each layer's input,
@@ -16,7 +20,7 @@ pub fn row_scale(row: &[f32]) -> f32 {
     scale_of(row.iter().fold(0.0, |largest: f32, weight| largest.max(weight.abs())), LARGEST_WEIGHT)
 }
 
-/// The network with each weight of its layers replaced by the nearest number that int8 can hold; biases and skip as they
+/// The network with each weight of its layers replaced by the nearest whole number of its row's steps; biases and skip as they
 /// are.
 pub fn with_rounded_weights(network: &FloatNetwork) -> FloatNetwork {
     let mut rounded = network.clone();
@@ -103,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn training_rounds_as_the_exporter_does() {
+    fn training_rounds_to_the_nearest_step_of_each_row() {
         let (inputs, outputs) = (13, 19);
         let weight = |input: usize, output: usize| {
             if output == 3 { 0.0 } else { ((input * 37 + output * 11) % 29) as f32 / 7.3 - 1.9 }
@@ -121,14 +125,14 @@ mod tests {
             output_scale: vec![1.0; outputs],
             notes: Default::default(),
         };
-        let exported = with_rounded_weights(&network);
-        assert_ne!(exported, network);
+        let expected = with_rounded_weights(&network);
+        assert_ne!(expected, network);
         let source = PaddedMatrix::from_fn(inputs, outputs, weight);
         let mut rounded = PaddedMatrix::zeros(inputs, outputs);
         round_weights(Arch::new(), &source, &mut rounded, &mut [7.0; 64]);
-        for (index, value) in exported.layers[0].weights.iter().enumerate() {
+        for (index, value) in expected.layers[0].weights.iter().enumerate() {
             assert_eq!(*value, rounded.row(index % inputs)[index / inputs]);
         }
-        assert_eq!(with_rounded_weights(&exported), exported, "rounding twice changes nothing");
+        assert_eq!(with_rounded_weights(&expected), expected, "rounding twice changes nothing");
     }
 }

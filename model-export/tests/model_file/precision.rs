@@ -106,7 +106,7 @@ fn error(widths: &[usize], activation: Activation, gain: f32, precision: Precisi
 fn errors_of_wide_relu_networks_are_as_stated() {
     for (seed, inputs) in [(1, 12), (2, 12), (3, 36)] {
         let widths = [inputs, 128, 128, 128, 128, 6];
-        for (precision, bound) in [(Precision::Int8, 0.05), (Precision::Int16, 0.005), (Precision::Float, 5e-6)] {
+        for (precision, bound) in [(Precision::Int8, 0.06), (Precision::Int16, 0.005), (Precision::Float, 5e-6)] {
             let (worst, rms) = error(&widths, Activation::Relu, 2.0, precision, seed);
             println!("{widths:?} {precision:?}: {worst:.2e} of {rms:.2}");
             assert!(worst < bound, "{widths:?} {precision:?}: {worst} of {rms}");
@@ -116,7 +116,7 @@ fn errors_of_wide_relu_networks_are_as_stated() {
 
 #[test]
 fn errors_of_a_small_tanh_network_are_as_stated() {
-    for (precision, bound) in [(Precision::Int8, 0.05), (Precision::Int16, 1e-3), (Precision::Float, 5e-7)] {
+    for (precision, bound) in [(Precision::Int8, 0.01), (Precision::Int16, 1e-3), (Precision::Float, 3e-7)] {
         let (worst, rms) = error(&[3, 20, 20, 1], Activation::Tanh, 1.0, precision, 1);
         println!("3-20-20-1 {precision:?}: {worst:.2e} of {rms:.2}");
         assert!(worst < bound, "{precision:?}: {worst} of {rms}");
