@@ -1,5 +1,7 @@
 //! Layers in the order in which the kernels stream them ([`impromptu_firmware::network::kernel`]).
 
+use std::ops::Range;
+
 use impromptu_firmware::network::{
     ROWS,
     kernel::{Width, float_blocks, float_rows, portable::pair},
@@ -10,15 +12,21 @@ use crate::quantise::IntegerLayer;
 /// Inputs of a float layer are padded to a multiple of this.
 const FLOAT_PADDING: usize = 2;
 
+/// The rows of each block of a float layer, the last ones padding.
+pub(crate) fn float_row_blocks(outputs: usize) -> impl Iterator<Item = Range<usize>> {
+    let [twelves, eights] = float_blocks(float_rows(outputs)).unwrap_or_default();
+    let heights = std::iter::repeat_n(12, twelves).chain(std::iter::repeat_n(8, eights));
+    heights.scan(0, |next, height| {
+        *next += height;
+        Some(*next - height..*next)
+    })
+}
+
 /// The words of a float layer: row-major weights `[outputs][inputs]`, one bias for each output.
 pub fn float(weights: &[f32], bias: &[f32], inputs: usize) -> Vec<u32> {
     let outputs = bias.len();
     let mut words = Vec::new();
-    let [twelves, eights] = float_blocks(float_rows(outputs)).unwrap_or_default();
-    let mut start = 0;
-    for height in std::iter::repeat_n(12, twelves).chain(std::iter::repeat_n(8, eights)) {
-        let rows = start..start + height;
-        start += height;
+    for rows in float_row_blocks(outputs) {
         words.extend(rows.clone().map(|row| bias.get(row).copied().unwrap_or(0.0).to_bits()));
         for input in 0..inputs.next_multiple_of(FLOAT_PADDING) {
             let weight = |row: usize| if row < outputs && input < inputs { weights[row * inputs + input] } else { 0.0 };

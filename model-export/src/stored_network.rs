@@ -3,6 +3,8 @@
 //! *in* a loaded model; *out* plain vectors for batches and bounds; *never* a number that the firmware does not use;
 //! *source* the packed orders in `impromptu_firmware::network::kernel`.
 
+use std::ops::Range;
+
 use impromptu_firmware::{
     model::{Arithmetic, Blob, Card, LayerLayout, Model, Section},
     network::{
@@ -11,7 +13,10 @@ use impromptu_firmware::{
     },
 };
 
-use crate::float_network::{Activation, DenseLayer};
+use crate::{
+    float_network::{Activation, DenseLayer},
+    packing::float_row_blocks,
+};
 
 /// Where the accumulators of an integer layer go.
 #[derive(Clone, Debug, PartialEq)]
@@ -89,9 +94,13 @@ fn matrix<T>(outputs: usize, inputs: usize, at: impl Fn(usize, usize) -> T) -> V
 
 fn float_layer(blob: &Blob<'_>, section: Section, [inputs, outputs]: [usize; 2], activation: Activation) -> DenseLayer {
     let words = words(blob, section);
-    // Biases, then the weights of each input, for every block of rows.
-    let block = words.len() / network::padded(outputs).div_ceil(ROWS).max(1);
-    let at = |output: usize, place: usize| f32::from_bits(words[output / ROWS * block + ROWS * place + output % ROWS]);
+    // For every block of rows the biases, then the weights of each input.
+    let blocks: Vec<Range<usize>> = float_row_blocks(outputs).collect();
+    let depth = words.len() / blocks.last().map_or(1, |last| last.end);
+    let at = |output: usize, place: usize| {
+        let block = blocks.iter().find(|block| block.contains(&output)).cloned().unwrap_or_default();
+        f32::from_bits(words[block.start * depth + place * block.len() + output - block.start])
+    };
     DenseLayer {
         weights: matrix(outputs, inputs, |output, input| at(output, 1 + input)),
         bias: (0..outputs).map(|output| at(output, 0)).collect(),
