@@ -9,7 +9,7 @@ use impromptu_model_export::{
     float_network::Activation::{self, Linear, Relu, Tanh},
 };
 
-use crate::fixture::{Numbers, description, network, rows};
+use crate::fixture::{Numbers, network, rows, unlimited};
 
 /// Bits, the sign of zeros apart.
 fn bits(values: &[f32]) -> Vec<u32> {
@@ -44,7 +44,7 @@ fn every_row_has_the_bits_of_a_single_evaluation() {
         });
         assert_eq!(seen, all.len());
         for precision in [Precision::Float, Precision::Int8, Precision::Int16] {
-            let bytes = encode(&description(inputs), Some(&float), precision, &calibration).unwrap();
+            let bytes = encode(&unlimited(inputs), Some(&float), precision, &calibration).unwrap();
             let model = Model::from_bytes(&bytes).unwrap();
             let mut scratch = Scratch::new();
             Batch::of_model(&model).unwrap().evaluate(all.iter().map(Vec::as_slice), |row, outputs| {

@@ -7,7 +7,7 @@ use impromptu_model_export::{
 };
 use proptest::prelude::*;
 
-use crate::fixture::{Numbers, description, edited, network, rows};
+use crate::fixture::{Numbers, description, edited, network, rows, unlimited};
 
 /// A box round the inputs' means, `width` input scales to either side at most; some features do not move.
 fn envelope(numbers: &mut Numbers, float: &FloatNetwork, width: f32) -> Vec<(f32, f32)> {
@@ -83,10 +83,7 @@ fn check(bytes: &[u8], float: &FloatNetwork, points: &[Vec<f32>]) -> Vec<(Output
 }
 
 fn boxed(inputs: usize, envelope: Vec<(f32, f32)>) -> Description {
-    let mut description = description(inputs);
-    description.envelope = envelope;
-    description.outputs.iter_mut().for_each(|output| output.limit = 1e9);
-    description
+    Description { envelope, ..unlimited(inputs) }
 }
 
 fn activations() -> impl Strategy<Value = Vec<(usize, Activation)>> {

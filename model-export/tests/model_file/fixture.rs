@@ -78,6 +78,13 @@ pub(crate) fn lane(errors: [Vec<f32>; 2], outputs: Vec<f32>, integral: f32) -> L
     }
 }
 
+/// [`description`] for any network: one that is always beyond its limits would be refused.
+pub(crate) fn unlimited(window: usize) -> Description {
+    let mut description = description(window);
+    description.outputs.iter_mut().for_each(|output| output.limit = 1e6);
+    description
+}
+
 /// A network with hidden layers of these widths and activations.
 pub(crate) fn network(
     numbers: &mut Numbers,

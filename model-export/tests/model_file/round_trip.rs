@@ -11,7 +11,7 @@ use impromptu_model_export::{
 };
 use proptest::prelude::*;
 
-use crate::fixture::{Numbers, description, lane, network, rows};
+use crate::fixture::{Numbers, description, lane, network, rows, unlimited};
 
 /// Hidden layers of widths that are and are not multiples of the kernel's eight rows.
 fn hidden() -> impl Strategy<Value = Vec<(usize, Activation)>> {
@@ -46,10 +46,7 @@ proptest! {
         let mut numbers = Numbers(seed);
         let float = network(&mut numbers, inputs, &hidden, 2, skip);
         let rows = rows(&mut numbers, &float, 20);
-        let mut description = description(inputs);
-        // A network that is always beyond its limits would be refused.
-        description.outputs.iter_mut().for_each(|output| output.limit = 1e6);
-        let bytes = encode(&description, Some(&float), Precision::Float, &rows).unwrap();
+        let bytes = encode(&unlimited(inputs), Some(&float), Precision::Float, &rows).unwrap();
         let model = Model::from_bytes(&bytes).unwrap();
         for row in &rows {
             for (o, (expected, found)) in float.evaluate(row).into_iter().zip(firmware(&model, row)).enumerate() {
@@ -66,7 +63,7 @@ proptest! {
         let mut numbers = Numbers(seed);
         let float = network(&mut numbers, inputs, &hidden, 2, skip);
         let rows = rows(&mut numbers, &float, 200);
-        let bytes = encode(&description(inputs), Some(&float), Precision::Int8, &rows).unwrap();
+        let bytes = encode(&unlimited(inputs), Some(&float), Precision::Int8, &rows).unwrap();
         let model = Model::from_bytes(&bytes).unwrap();
         prop_assert_eq!(model.card().network.as_ref().unwrap().arithmetic, Arithmetic::Int8);
         let found = relative_difference(&float, &model, &rows);
@@ -80,7 +77,7 @@ proptest! {
         let float = network(&mut numbers, inputs, &[], 2, true);
         let rows = rows(&mut numbers, &float, 8);
         let precision = if int8 { Precision::Int8 } else { Precision::Float };
-        let bytes = encode(&description(inputs), Some(&float), precision, &rows).unwrap();
+        let bytes = encode(&unlimited(inputs), Some(&float), precision, &rows).unwrap();
         let model = Model::from_bytes(&bytes).unwrap();
         for row in &rows {
             let found = firmware(&model, row);
