@@ -140,7 +140,7 @@ impl Default for LaneRecipe {
             efforts: vec![6e-3, 1.2e-2],
             velocity_weights: vec![0.05, 0.2],
             noise_factors: vec![2.0],
-            fast_limits: vec![0.05, 0.1],
+            fast_limits: vec![0.1],
             authority_scales: vec![6.0, 15.0],
             error_scale: 0.05,
             authority_decay: 0.97,
