@@ -14,9 +14,10 @@ const FLOAT_PADDING: usize = 2;
 pub fn float(weights: &[f32], bias: &[f32], inputs: usize) -> Vec<u32> {
     let outputs = bias.len();
     let mut words = Vec::new();
-    let [twelves, eights] = float_blocks(float_rows(outputs)).unwrap_or_default();
+    let [twelves, eights, sixes] = float_blocks(float_rows(outputs)).unwrap_or_default();
     let mut start = 0;
-    for height in std::iter::repeat_n(12, twelves).chain(std::iter::repeat_n(8, eights)) {
+    let heights = [(12, twelves), (8, eights), (6, sixes)];
+    for height in heights.into_iter().flat_map(|(height, count)| std::iter::repeat_n(height, count)) {
         let rows = start..start + height;
         start += height;
         words.extend(rows.clone().map(|row| bias.get(row).copied().unwrap_or(0.0).to_bits()));

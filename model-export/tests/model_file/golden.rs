@@ -16,13 +16,13 @@ fn the_format_is_what_it_was() {
     assert_eq!(
         hexadecimal(&bytes[..64]),
         [
-            "494d50524f4d50540100000028010000",
-            "44020000f036f89d0000000000000000",
+            "494d50524f4d50540100000027010000",
+            "240200004cb2af9a0000000000000000",
             "05736d616c6c04636172740000047465",
             "73740700000208706f736974696f6e01",
         ]
     );
-    assert_eq!((bytes.len(), Model::from_bytes(&bytes).unwrap().checksum(), file::VERSION), (916, 0x9df8_36f0, 1));
+    assert_eq!((bytes.len(), Model::from_bytes(&bytes).unwrap().checksum(), file::VERSION), (884, 0x9aaf_b24c, 1));
     let float = small_model(Precision::Float);
-    assert_eq!((float.len(), Model::from_bytes(&float).unwrap().checksum()), (948, 0x7abf_e695));
+    assert_eq!((float.len(), Model::from_bytes(&float).unwrap().checksum()), (964, 0x5afb_da1e));
 }
