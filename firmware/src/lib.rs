@@ -7,7 +7,7 @@
 //!                           └───┴──────────────────── measured state ─────────────────────────────────────────────────────┘
 //! ```
 //!
-//! `no_std`, no heap, no unsafe code, no clock: time is an argument. SI units; world frame ENU (z up), body frame FLU, Hamilton quaternion
+//! `no_std`, no heap, no unsafe code but in the Cortex-M4 kernels, no clock: time is an argument. SI units; world frame ENU (z up), body frame FLU, Hamilton quaternion
 //! body to world, f32. The same bits on the host and on a Cortex-M4F. Errors exist where bytes enter
 //! ([`model::Model::from_bytes`]); in flight nothing returns a `Result`.
 #![cfg_attr(not(test), no_std)]

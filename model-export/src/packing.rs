@@ -14,9 +14,9 @@ const FLOAT_PADDING: usize = 2;
 
 /// The rows of each block of a float layer, the last ones padding.
 pub(crate) fn float_row_blocks(outputs: usize) -> impl Iterator<Item = Range<usize>> {
-    let [twelves, eights] = float_blocks(float_rows(outputs)).unwrap_or_default();
-    let heights = std::iter::repeat_n(12, twelves).chain(std::iter::repeat_n(8, eights));
-    heights.scan(0, |next, height| {
+    let [twelves, eights, sixes] = float_blocks(float_rows(outputs)).unwrap_or_default();
+    let blocks = [(12, twelves), (8, eights), (6, sixes)].into_iter();
+    blocks.flat_map(|(height, count)| std::iter::repeat_n(height, count)).scan(0, |next, height| {
         *next += height;
         Some(*next - height..*next)
     })

@@ -13,7 +13,7 @@
 //! # Floats
 //! Twelve accumulators in s0-s11, an input's weights in s12-s23, eight inputs in s24-s31. Eight inputs × 12 rows: 96 VMUL, 96 VADD,
 //! 8 × 13 + 9 cycles of VLDM: 305. What rows are left go by eight: accumulators in s0-s7, two inputs' weights in s8-s23; eight inputs:
-//! 64 + 64 + 4 × 17 + 9 = 205. No result is used by the next instruction, which would stall.
+//! 64 + 64 + 4 × 17 + 9 = 205. Six rows alone: 48 + 48 + 4 × 13 + 9 = 157. No result is used by the next instruction, which would stall.
 #![allow(unsafe_code)]
 
 use core::arch::naked_asm;
@@ -319,7 +319,7 @@ struct Float {
 
 /// [`super::float`], if the arguments suit the kernel; else `false` and nothing has been done.
 pub(super) fn float(stream: &[[u8; 4]], inputs: &[u32], relu: bool, outputs: &mut [u32]) -> bool {
-    let Some([twelves, _]) = float_blocks(outputs.len()) else { return false };
+    let Some([twelves, _, sixes]) = float_blocks(outputs.len()) else { return false };
     let pairs = !inputs.is_empty() && inputs.len().is_multiple_of(2);
     if !(pairs && aligned(stream) && stream.len() == outputs.len() * (1 + inputs.len())) {
         return false;
@@ -337,10 +337,16 @@ pub(super) fn float(stream: &[[u8; 4]], inputs: &[u32], relu: bool, outputs: &mu
         outputs_end: outputs.end,
     };
     // SAFETY: the pointers come from live slices, `stream` is aligned to words, and the three lengths fit together (checked above):
-    // `outputs` is exactly `twelves` blocks of twelve and the rest of eight rows, for each of which the kernel reads its part of the stream
+    // `outputs` is exactly one block of six, or `twelves` blocks of twelve and the rest of eight rows, for each of which the kernel reads its part of the stream
     // and all of `inputs` (`pairs` pairs, then whole groups of eight). It writes exactly `outputs` and keeps the registers that the calling
     // convention protects.
-    unsafe { float_kernel(&arguments) };
+    unsafe {
+        if sixes > 0 {
+            float_six_kernel(&arguments);
+        } else {
+            float_kernel(&arguments);
+        }
+    }
     true
 }
 
@@ -387,7 +393,24 @@ macro_rules! float_eight {
     };
 }
 
-/// ReLU of four accumulators, stored.
+/// Two inputs, six rows: `$first` and `$second` hold the inputs.
+macro_rules! float_six {
+    ($first:literal, $second:literal) => {
+        concat!(
+            "vldm r0!, {{s8-s19}}\n",
+            each!("vmul.f32" "s8" "s8" $first; "vmul.f32" "s9" "s9" $first; "vmul.f32" "s10" "s10" $first;
+                "vmul.f32" "s11" "s11" $first; "vmul.f32" "s12" "s12" $first; "vmul.f32" "s13" "s13" $first;
+                "vadd.f32" "s0" "s0" "s8"; "vadd.f32" "s1" "s1" "s9"; "vadd.f32" "s2" "s2" "s10";
+                "vadd.f32" "s3" "s3" "s11"; "vadd.f32" "s4" "s4" "s12"; "vadd.f32" "s5" "s5" "s13";
+                "vmul.f32" "s14" "s14" $second; "vmul.f32" "s15" "s15" $second; "vmul.f32" "s16" "s16" $second;
+                "vmul.f32" "s17" "s17" $second; "vmul.f32" "s18" "s18" $second; "vmul.f32" "s19" "s19" $second;
+                "vadd.f32" "s0" "s0" "s14"; "vadd.f32" "s1" "s1" "s15"; "vadd.f32" "s2" "s2" "s16";
+                "vadd.f32" "s3" "s3" "s17"; "vadd.f32" "s4" "s4" "s18"; "vadd.f32" "s5" "s5" "s19";),
+        )
+    };
+}
+
+/// ReLU of four accumulators, stored one by one: a cycle less than STM.
 macro_rules! float_relu {
     ($a:literal, $b:literal, $c:literal, $d:literal) => {
         concat!(
@@ -401,7 +424,7 @@ macro_rules! float_relu {
             $d,
             "\n",
             "bic r4, r4, r4, asr #31\nbic r5, r5, r5, asr #31\nbic r6, r6, r6, asr #31\nbic r7, r7, r7, asr #31\n",
-            "stm.w r2!, {{r4-r7}}\n",
+            "str r4, [r2], #4\nstr r5, [r2], #4\nstr r6, [r2], #4\nstr r7, [r2], #4\n",
         )
     };
 }
@@ -425,17 +448,8 @@ unsafe extern "C" fn float_kernel(arguments: &Float) {
         "20:",
         "vldm r0!, {{s0-s11}}",
         "mov.w r12, r1",
-        "bx lr",
-        ".balign 4",
-        "21:",
-        "vldm r12!, {{s26-s31}}",
-        "b.w 11f",
-        "22:",
-        "vldm r12!, {{s28-s31}}",
-        "b.w 12f",
-        "23:",
-        "vldm r12!, {{s30-s31}}",
-        "b.w 13f",
+        "cmp.w r8, #0",
+        "bne.w 24f",
         "10:",
         "vldm r12!, {{s24-s31}}",
         float_twelve!("s24"),
@@ -501,6 +515,18 @@ unsafe extern "C" fn float_kernel(arguments: &Float) {
         "59:",
         "vpop {{s16-s31}}",
         "pop {{r4-r11, pc}}",
+        "21:",
+        "vldm r12!, {{s26-s31}}",
+        "b.w 11b",
+        "22:",
+        "vldm r12!, {{s28-s31}}",
+        "b.w 12b",
+        "23:",
+        "vldm r12!, {{s30-s31}}",
+        "b.w 13b",
+        "24:",
+        "bx lr",
+        ".balign 4",
         "40:",
         "vstm r2!, {{s0-s11}}",
         "b.w 14b",
@@ -512,5 +538,64 @@ unsafe extern "C" fn float_kernel(arguments: &Float) {
         ".word 10b + 1, 23b + 1, 22b + 1, 21b + 1",
         "91:",
         ".word 70b + 1, 63b + 1, 62b + 1, 61b + 1",
+    )
+}
+
+/// The same for a single block of six rows.
+///
+/// # Safety
+/// As for [`float_kernel`].
+#[unsafe(naked)]
+unsafe extern "C" fn float_six_kernel(arguments: &Float) {
+    naked_asm!(
+        ".arch armv7e-m",
+        ".fpu fpv4-sp-d16",
+        ".balign 4",
+        "push {{r4-r11, lr}}",
+        "vpush {{s16-s31}}",
+        "ldm.w r0, {{r0-r3, r8-r11}}",
+        "adr.w r4, 90f",
+        "ldr.w lr, [r4, r8, lsl #2]",
+        "vldm r0!, {{s0-s5}}",
+        "mov.w r12, r1",
+        "bx lr",
+        ".balign 4",
+        "21:",
+        "vldm r12!, {{s26-s31}}",
+        "b.w 11f",
+        "22:",
+        "vldm r12!, {{s28-s31}}",
+        "b.w 12f",
+        "23:",
+        "vldm r12!, {{s30-s31}}",
+        "b.w 13f",
+        "10:",
+        "vldm r12!, {{s24-s31}}",
+        float_six!("s24", "s25"),
+        "11:",
+        float_six!("s26", "s27"),
+        "12:",
+        float_six!("s28", "s29"),
+        "13:",
+        float_six!("s30", "s31"),
+        "cmp.w r12, r9",
+        "bne.w 10b",
+        "cmp.w r10, #0",
+        "bne.w 40f",
+        float_relu!("s0", "s1", "s2", "s3"),
+        "vmov r4, s4",
+        "vmov r5, s5",
+        "bic r4, r4, r4, asr #31",
+        "bic r5, r5, r5, asr #31",
+        "stm.w r2!, {{r4-r5}}",
+        "b.w 59f",
+        "40:",
+        "vstm r2!, {{s0-s5}}",
+        "59:",
+        "vpop {{s16-s31}}",
+        "pop {{r4-r11, pc}}",
+        ".balign 4",
+        "90:",
+        ".word 10b + 1, 23b + 1, 22b + 1, 21b + 1",
     )
 }

@@ -39,14 +39,22 @@ impl<'a> Layer<'a> {
         Ok(Self { stream, inputs: inputs as u16, outputs: outputs as u16, activation })
     }
 
-    #[inline(never)]
+    #[inline(always)]
     fn hidden(&self, inputs: &[u32], outputs: &mut [u32]) {
         let (Some(inputs), Some(outputs)) = (inputs.get(..self.inputs.into()), outputs.get_mut(..self.outputs.into())) else {
             return;
         };
         kernel::float(self.stream.all(), inputs, self.activation == Activation::Relu, outputs);
         if self.activation == Activation::Tanh {
-            outputs.iter_mut().for_each(|word| *word = tanh(f32::from_bits(*word)).to_bits());
+            Self::activate(outputs);
+        }
+    }
+
+    /// Tanh, two at a time, so that one's arithmetic fills the other's stalls; the rows are even in number.
+    #[inline(never)]
+    fn activate(words: &mut [u32]) {
+        for pair in words.as_chunks_mut::<2>().0 {
+            *pair = pair.map(|word| tanh(f32::from_bits(word)).to_bits());
         }
     }
 
@@ -54,8 +62,8 @@ impl<'a> Layer<'a> {
     #[inline(never)]
     pub(super) fn outputs(&self, inputs: &[u32], result: &mut [f32; MAX_OUTPUTS]) {
         let mut outputs = [0; ROWS];
-        if let Some(inputs) = inputs.get(..self.inputs.into()) {
-            kernel::float(self.stream.all(), inputs, false, &mut outputs);
+        if let (Some(inputs), Some(outputs)) = (inputs.get(..self.inputs.into()), outputs.get_mut(..self.outputs.into())) {
+            kernel::float(self.stream.all(), inputs, false, outputs);
         }
         for (result, output) in result.iter_mut().zip(outputs) {
             *result += f32::from_bits(output);
@@ -63,17 +71,12 @@ impl<'a> Layer<'a> {
     }
 }
 
-/// Runs the layers on the inputs in `current`; adds to `result`.
-pub(super) fn evaluate<'s>(
-    layers: &[Layer<'_>],
-    mut current: &'s mut [u32],
-    mut other: &'s mut [u32],
-    result: &mut [f32; MAX_OUTPUTS],
-) {
-    let Some((last, hidden)) = layers.split_last() else { return };
-    for layer in hidden {
+/// Runs the hidden layers on the inputs in `current`; gives the last one's outputs.
+#[inline(never)]
+pub(super) fn hidden<'s>(layers: &[Layer<'_>], mut current: &'s mut [u32], mut other: &'s mut [u32]) -> &'s [u32] {
+    for layer in layers {
         layer.hidden(current, other);
         core::mem::swap(&mut current, &mut other);
     }
-    last.outputs(current, result);
+    current
 }

@@ -113,7 +113,7 @@ impl<'a> Layer<'a> {
         Ok(())
     }
 
-    #[inline(never)]
+    #[inline(always)]
     fn hidden(&self, codes: &[u32], outputs: &mut [u32]) {
         let limit = self.limits[1];
         let (Some(codes), Some(outputs)) = (codes.get(..self.inputs.into()), outputs.get_mut(..self.outputs.into())) else {
@@ -124,36 +124,40 @@ impl<'a> Layer<'a> {
             Activation::Tanh | Activation::Linear => Finish::Preactivations,
         };
         kernel::integer(self.width, self.stream.all(), codes, finish, outputs);
-        let outputs = outputs.get_mut(..self.read.into()).unwrap_or_default();
-        match self.activation {
-            Activation::Relu => {}
-            Activation::Tanh => {
-                let factor = self.factor;
-                each_code(outputs, |code| scaled_tanh(code as u16, factor));
-            }
-            Activation::Linear => {
-                let limit = limit as i16;
-                each_code(outputs, |code| {
-                    if code > limit {
-                        limit
-                    } else if code < -limit {
-                        -limit
-                    } else {
-                        code
-                    }
-                });
-            }
+        if finish == Finish::Preactivations {
+            self.activate(outputs);
         }
     }
 
+    /// Pre-activations to codes; a function of its own, to keep the way of ReLU short.
     #[inline(never)]
-    fn last(&self, codes: &[u32], result: &mut [f32; MAX_OUTPUTS]) {
-        let mut sums = [0; MAX_OUTPUTS];
-        let Some(codes) = codes.get(..self.inputs.into()) else { return };
-        kernel::integer(self.width, self.stream.all(), codes, Finish::Sums, &mut sums);
+    fn activate(&self, words: &mut [u32]) {
+        let words = words.get_mut(..self.read.into()).unwrap_or_default();
+        if self.activation == Activation::Tanh {
+            let factor = self.factor;
+            each_code(words, |code| scaled_tanh(code as u16, factor));
+        } else {
+            let limit = self.limits[1] as i16;
+            each_code(words, |code| {
+                if code > limit {
+                    limit
+                } else if code < -limit {
+                    -limit
+                } else {
+                    code
+                }
+            });
+        }
+    }
+
+    /// Adds the last layer's outputs to `result`; the accumulators go through `sums`, which saves stack.
+    #[inline(never)]
+    pub(super) fn last(&self, codes: &[u32], sums: &mut [u32], result: &mut [f32; MAX_OUTPUTS]) {
+        let (Some(codes), Some(sums)) = (codes.get(..self.inputs.into()), sums.first_chunk_mut::<ROWS>()) else { return };
+        kernel::integer(self.width, self.stream.all(), codes, Finish::Sums, sums);
         let Some(scales) = self.stream.all().last_chunk::<ROWS>() else { return };
         for ((value, sum), scale) in result.iter_mut().zip(sums).zip(scales) {
-            *value += sum as i32 as f32 * f32::from_le_bytes(*scale);
+            *value += *sum as i32 as f32 * f32::from_le_bytes(*scale);
         }
     }
 }
@@ -186,17 +190,12 @@ pub(super) fn encode(normalised: &[u32], count: usize, factor: f32, layers: &[La
     }
 }
 
-/// Runs the layers on the input codes in `current`; adds to `result`.
-pub(super) fn evaluate<'s>(
-    layers: &[Layer<'_>],
-    mut current: &'s mut [u32],
-    mut other: &'s mut [u32],
-    result: &mut [f32; MAX_OUTPUTS],
-) {
-    let Some((last, hidden)) = layers.split_last() else { return };
-    for layer in hidden {
+/// Runs the hidden layers on the input codes in `current`; gives the last one's codes, and the other half of the memory.
+#[inline(never)]
+pub(super) fn hidden<'s>(layers: &[Layer<'_>], mut current: &'s mut [u32], mut other: &'s mut [u32]) -> [&'s mut [u32]; 2] {
+    for layer in layers {
         layer.hidden(current, other);
         core::mem::swap(&mut current, &mut other);
     }
-    last.last(current, result);
+    [current, other]
 }

@@ -24,8 +24,8 @@
 //! An accumulator is bias + Σ weight × code, modulo 2³²; the loader proves that the sum itself never leaves 32 bits.
 //!
 //! # Float stream
-//! Outputs are padded to a multiple of 4, at least 8, and divided into blocks of twelve rows and at most two of eight at the end
-//! ([`float_blocks`]). For each block: its f32 biases, then for each input the block's f32 weights. An accumulator starts at the bias and
+//! Up to six outputs are one block of six rows. More are padded to a multiple of 4, at least 8, and divided into blocks of twelve rows and at
+//! most two of eight at the end ([`float_blocks`]). For each block: its f32 biases, then for each input the block's f32 weights. An accumulator starts at the bias and
 //! adds weight × input in the inputs' order, each product and each sum rounded.
 //!
 //! The number of inputs is padded with zero weights: to a multiple of 4 (integers) or of 2 (floats).
@@ -102,16 +102,23 @@ pub fn integer(width: Width, stream: &[[u8; 4]], inputs: &[u32], finish: Finish,
 
 /// Rows of a float layer of so many outputs.
 pub const fn float_rows(outputs: usize) -> usize {
-    if outputs < 8 { 8 } else { outputs.next_multiple_of(4) }
+    match outputs {
+        ..=6 => 6,
+        7 => 8,
+        _ => outputs.next_multiple_of(4),
+    }
 }
 
-/// How many blocks of twelve and then of eight rows make so many rows; none if that is not possible.
-pub const fn float_blocks(rows: usize) -> Option<[usize; 2]> {
+/// How many blocks of twelve, eight and six rows make so many rows; none if that is not possible.
+pub const fn float_blocks(rows: usize) -> Option<[usize; 3]> {
+    if rows == 6 {
+        return Some([0, 0, 1]);
+    }
     if rows < 8 || !rows.is_multiple_of(4) {
         return None;
     }
     let eights = [0, 2, 1][rows / 4 % 3];
-    Some([(rows - 8 * eights) / 12, eights])
+    Some([(rows - 8 * eights) / 12, eights, 0])
 }
 
 /// Runs a float layer. `inputs` are the bits of an even number of f32, `outputs` those of all the rows in `stream`.

@@ -129,13 +129,18 @@ impl<'a> Network<'a> {
             Layers::Float(layers) => {
                 self.normalise(inputs, front);
                 self.skip(front, &mut result);
-                float::evaluate(layers, front, back, &mut result);
+                if let Some((last, layers)) = layers.split_last() {
+                    last.outputs(float::hidden(layers, front, back), &mut result);
+                }
             }
             Layers::Integer { code, layers } => {
                 self.normalise(inputs, back);
                 integer::encode(back, inputs.len(), *code, layers, front);
                 self.skip(back, &mut result);
-                integer::evaluate(layers, front, back, &mut result);
+                if let Some((last, layers)) = layers.split_last() {
+                    let [codes, sums] = integer::hidden(layers, front, back);
+                    last.last(codes, sums, &mut result);
+                }
             }
         }
         self.denormalise(&result, outputs);

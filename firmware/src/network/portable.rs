@@ -29,6 +29,7 @@ pub const fn pair(low: i16, high: i16) -> u32 {
 }
 
 /// [`super::integer`] on any machine.
+#[inline(never)]
 pub fn integer(width: Width, stream: &[[u8; 4]], inputs: &[u32], finish: Finish, outputs: &mut [u32]) {
     let blocks = stream.chunks_exact(width.block(inputs.len()));
     for (block, outputs) in blocks.zip(outputs.chunks_exact_mut(finish.words())) {
@@ -77,12 +78,17 @@ fn multiply_add(weights: [i16; 2], input: u32, sum: i32) -> i32 {
 }
 
 /// [`super::float`] on any machine.
+#[inline(never)]
 pub fn float(stream: &[[u8; 4]], inputs: &[u32], relu: bool, outputs: &mut [u32]) {
-    let Some([twelves, _]) = float_blocks(outputs.len()) else { return };
+    let Some([twelves, _, sixes]) = float_blocks(outputs.len()) else { return };
     let (first, rest) = outputs.split_at_mut(12 * twelves);
     let Some((first_stream, rest_stream)) = stream.split_at_checked(12 * twelves * (1 + inputs.len())) else { return };
     float_part::<12>(first_stream, inputs, relu, first);
-    float_part::<8>(rest_stream, inputs, relu, rest);
+    if sixes > 0 {
+        float_part::<6>(rest_stream, inputs, relu, rest);
+    } else {
+        float_part::<8>(rest_stream, inputs, relu, rest);
+    }
 }
 
 /// The blocks of `N` rows.

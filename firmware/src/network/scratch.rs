@@ -1,11 +1,11 @@
 //! Working memory of an evaluation.
 
-use super::{INPUT_PADDING, padded};
+use super::{INPUT_PADDING, ROWS, padded};
 use crate::model::{Arithmetic, MAX_FEATURES, MAX_WIDTH, NetworkLayout};
 
 /// Words that are enough for every network.
 pub const MAX_SCRATCH: usize = 2 * MAX_WIDTH;
-const _: () = assert!(MAX_FEATURES <= MAX_WIDTH && MAX_WIDTH.is_multiple_of(super::ROWS));
+const _: () = assert!(MAX_FEATURES <= MAX_WIDTH && MAX_WIDTH.is_multiple_of(ROWS));
 
 /// `WORDS` words for the activations of two layers. Without a number it serves any network; [`super::Network::scratch_words`] says how
 /// many one network needs (128 words, 512 bytes, for integer layers of 128 units).
@@ -42,8 +42,9 @@ impl<const WORDS: usize> Default for Scratch<WORDS> {
 
 /// Words of the activations of the widest layer of a checked network, the inputs included.
 pub(super) fn half(layout: &NetworkLayout, inputs: usize) -> usize {
-    // The normalised inputs are f32 in any arithmetic; integer layers take two outputs to a word.
+    // The normalised inputs are f32 in any arithmetic; integer layers take two outputs to a word;
+    // the last one's accumulators need a half too.
     let codes = if layout.arithmetic == Arithmetic::Float { 1 } else { 2 };
     let hidden = layout.layers.iter().rev().skip(1).map(|layer| padded(usize::from(layer.outputs)) / codes);
-    hidden.fold(inputs.next_multiple_of(INPUT_PADDING), usize::max)
+    hidden.fold(inputs.next_multiple_of(INPUT_PADDING).max(ROWS), usize::max)
 }

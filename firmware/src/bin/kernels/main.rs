@@ -1,6 +1,6 @@
 //! Runs the network kernels on the emulated board, beside their portable twin.
 //!
-//! - in: `cases.bin` in the folder where the emulator was started: layers with weights and inputs ([`case`])
+//! - in: `cases.bin` in the folder where the emulator was started: layers with weights and inputs (laid out in `case.rs`)
 //! - out: `outputs.bin` beside it: for each case the words that the assembly gave; and one line that counts the cases in which the twin,
 //!   compiled for the same processor, gave others, and those whose stream was not aligned, which the twin alone can run
 //! - never: judges by itself whether the outputs are right; the host does, with its own twin
