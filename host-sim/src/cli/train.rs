@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result, bail};
 use clap::Args;
 use impromptu_firmware::flight::Rates;
 use impromptu_model_export::{
-    Description, FloatNetwork, Precision,
+    Description, Precision,
     description::{LaneDescription, Provenance, Timing},
     encode,
 };
@@ -23,8 +23,8 @@ use super::{
 };
 use crate::{
     experiment::{
-        Judge, Learned, Loop, Purpose, Recipe, Rows, best_in_flight, demo::Observer as _, derived, describe, learn, smoothing,
-        validation_strokes, write_model_files,
+        Candidates, Judge, Learned, Loop, Purpose, Recipe, Rows, best_in_flight, demo::Observer as _, derived, describe, learn,
+        smoothing, validation_strokes, write_model_files,
     },
     flight_log::FlightLog,
     training::Progress,
@@ -117,8 +117,8 @@ impl Train {
         let in_flight = origin.plant.as_ref().map(|plant| {
             let flight_seed = derived(seed, Purpose::Validation);
             let (recipe, validation) = (&recipe, &validation);
-            move |ridge: &FloatNetwork, candidates: &[FloatNetwork], rows: &Rows| {
-                best_in_flight(recipe, plant, validation, flight_seed, ridge, candidates, rows)
+            move |candidates: Candidates<'_>, rows: &Rows| {
+                best_in_flight(recipe, plant, validation, flight_seed, candidates, rows)
             }
         });
         let judge = in_flight.as_ref().map(|judge| judge as &Judge<'_>);

@@ -6,7 +6,7 @@ use impromptu_model_export::{ExportError, FloatNetwork, Precision, description::
 use super::{
     flights::{FlightsError, Loop, reduction},
     lane::{LaneChoice, LaneRefusal, choose_lane, dithered_logs, strongest_lane},
-    learn::{LearnError, Learned, Rows, learn},
+    learn::{Candidates, LearnError, Learned, Rows, learn},
     models::{ModelSet, describe, feedforward},
     recipe::{LaneRecipe, Recipe},
 };
@@ -108,9 +108,8 @@ pub fn build(recipe: &Recipe, plant: &Loop, seed: u64, progress: &mut dyn FnMut(
     let logs = training_logs(&recipe, plant, seed)?;
     let validation = validation_strokes(&recipe, &recipe.validation_speeds, plant.rate_hz(), seed)?;
     let flight_seed = derived(seed, Purpose::Validation);
-    let judge = |ridge: &FloatNetwork, candidates: &[FloatNetwork], rows: &Rows| {
-        best_in_flight(&recipe, plant, &validation, flight_seed, ridge, candidates, rows)
-    };
+    let judge =
+        |candidates: Candidates<'_>, rows: &Rows| best_in_flight(&recipe, plant, &validation, flight_seed, candidates, rows);
     let learned = learn(&recipe, &logs, delay, smoothing(&recipe, plant), Some(&judge), progress)?;
     drop(logs);
 
@@ -159,8 +158,7 @@ pub fn best_in_flight(
     plant: &Loop,
     validation: &[Trajectory],
     seed: u64,
-    ridge: &FloatNetwork,
-    candidates: &[FloatNetwork],
+    candidates: Candidates<'_>,
     rows: &Rows,
 ) -> Result<usize, BuildError> {
     let lanes = Lanes { network: true, feedback: false };
@@ -174,9 +172,9 @@ pub fn best_in_flight(
         .map(|(plant, trajectories)| plant.errors(trajectories, None, 1.0, seed))
         .collect::<Result<_, _>>()
         .map_err(FlightsError::from)?;
-    let fly = |network: &FloatNetwork| -> Result<Vec<f64>, BuildError> {
+    let fly = |network: &FloatNetwork, precision| -> Result<Vec<f64>, BuildError> {
         let description = describe(recipe, plant, rows, None, "candidate", "", seed);
-        let bytes = encode(&description, Some(network), Precision::Float, &rows.calibration)?;
+        let bytes = encode(&description, Some(network), precision, &rows.calibration)?;
         let model = Model::from_bytes(&bytes).map_err(ExportError::Refused)?;
         kinds
             .iter()
@@ -187,10 +185,10 @@ pub fn best_in_flight(
             })
             .collect()
     };
-    let bar = fly(ridge)?;
+    let bar = fly(candidates.ridge, Precision::Float)?;
     let mut best = (false, f64::NEG_INFINITY, 0);
-    for (index, candidate) in candidates.iter().enumerate() {
-        let found = fly(candidate)?;
+    for (index, candidate) in candidates.networks.iter().enumerate() {
+        let found = fly(candidate, candidates.precision)?;
         let harmless = found.iter().zip(&bar).all(|(network, ridge)| *network >= ridge - LOSS_AGAINST_RIDGE);
         let mean = found.iter().sum::<f64>() / found.len().max(1) as f64;
         if (harmless, mean) > (best.0, best.1) {

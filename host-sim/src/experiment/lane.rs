@@ -295,9 +295,10 @@ fn flown(
     Ok((candidates, scores))
 }
 
-/// A nominal flight may lose this much, per cent of the baseline's error, against the network lane alone; what the worst one loses
-/// beyond it is taken off the score.
+/// A nominal flight may lose this much, per cent of the baseline's error, against the network lane alone; of what the worst one loses
+/// beyond it, a share is taken off the score: it is one flight of many.
 const LOSS_AGAINST_NETWORK: f64 = 1.0;
+const LOSS_SHARE: f64 = 0.2;
 
 /// Designs lanes from dithered `logs` and chooses one by flights over the `validation` trajectories. `encode` makes a
 /// model file with a lane; the network lane flies too.
@@ -347,7 +348,7 @@ pub fn strongest_lane(
 
 fn best(candidates: &[Candidate], scores: &[Score], wanted: &dyn Fn(&Score) -> bool) -> Option<LaneChoice> {
     let places = candidates.iter().zip(scores).filter(|(_, score)| wanted(score));
-    let merit = |score: &Score| score.mean + (score.over_network + LOSS_AGAINST_NETWORK).min(0.0);
+    let merit = |score: &Score| score.mean + LOSS_SHARE * (score.over_network + LOSS_AGAINST_NETWORK).min(0.0);
     places.max_by(|(_, a), (_, b)| merit(a).total_cmp(&merit(b))).map(|(candidate, score)| LaneChoice {
         lane: candidate.lane.clone(),
         design: candidate.design.clone(),

@@ -1,7 +1,7 @@
 //! From logs to networks: ridge regression, the network that refines it, the same fine-tuned for int8.
 
 use impromptu_firmware::quadrotor::REFERENCE;
-use impromptu_model_export::{Batch, FloatNetwork};
+use impromptu_model_export::{Batch, FloatNetwork, Precision};
 
 use super::{
     breakdown::{Breakdown, sound},
@@ -55,8 +55,19 @@ pub struct Learned {
 /// Rows of calibration that are kept.
 const CALIBRATION_ROWS: usize = 512;
 
-/// A choice among networks: called with the ridge regression and the candidates, answers with a candidate's index.
-pub type Judge<'a> = dyn Fn(&FloatNetwork, &[FloatNetwork], &Rows) -> Result<usize, BuildError> + 'a;
+/// Networks to choose between, and the number format in which they shall fly.
+#[derive(Clone, Copy, Debug)]
+pub struct Candidates<'a> {
+    /// The ridge regression, which is the bar.
+    pub ridge: &'a FloatNetwork,
+    /// The networks.
+    pub networks: &'a [FloatNetwork],
+    /// Number format of the networks' dense layers.
+    pub precision: Precision,
+}
+
+/// A choice among networks: answers with the index of one.
+pub type Judge<'a> = dyn Fn(Candidates<'_>, &Rows) -> Result<usize, BuildError> + 'a;
 
 /// What a description needs of the training rows.
 #[derive(Clone, Debug)]
@@ -112,12 +123,19 @@ pub fn learn(
         let network = train(&settings, &training, &validation, progress)?.network;
         candidates.extend(recipe.shares.iter().map(|&share| shared(&network, share)));
     }
-    let chosen = match judge {
-        Some(judge) => judge(&ridge, &candidates, &rows).map_err(|error| LearnError::Judge(error.into()))?,
-        None => best_on_rows(&candidates, &validation),
+    let choose = |networks: Vec<FloatNetwork>, precision| {
+        let index = match judge {
+            Some(judge) => judge(Candidates { ridge: &ridge, networks: &networks, precision }, &rows)
+                .map_err(|error| LearnError::Judge(error.into()))?,
+            None => best_on_rows(&networks, &validation),
+        };
+        networks.into_iter().nth(index).ok_or(LearnError::NoCandidate)
     };
-    let network = candidates.into_iter().nth(chosen).ok_or(LearnError::NoCandidate)?;
-    let quantised = fine_tune(&network, &recipe.fine_tuning, &training, &validation, progress)?.network;
+    let network = choose(candidates, Precision::Float)?;
+    // The exporter rounds with the error of one weight made good by the others, which training cannot imitate: whether the fine-tuning
+    // helps is seen in flight.
+    let tuned = fine_tune(&network, &recipe.fine_tuning, &training, &validation, progress)?.network;
+    let quantised = choose(vec![network.clone(), tuned], Precision::Int8)?;
     Ok(Learned { ridge, network, quantised, rows, broken })
 }
 

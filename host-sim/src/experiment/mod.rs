@@ -20,6 +20,6 @@ pub use evaluation::{EvaluationError, evaluate, model_card, per_flight, traces};
 pub use files::write_model_files;
 pub use flights::{FlightsError, Loop, reduction};
 pub use lane::{LaneChoice, LaneRefusal, choose_lane, dithered_logs, strongest_lane};
-pub use learn::{Judge, LearnError, Learned, Rows, learn};
+pub use learn::{Candidates, Judge, LearnError, Learned, Rows, learn};
 pub use models::{ModelSet, describe, feedforward};
 pub use recipe::{Excitation, LaneRecipe, Recipe, Signal};
