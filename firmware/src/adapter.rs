@@ -4,14 +4,18 @@
 //! *never* a correction beyond the model's limits and slew, never any change of the desired reference when both lanes are off;
 //! *source* Zhou 2017, Fig. 1. What differs: the correction is ramped between sub-rate ticks, and a feedback lane adds to it.
 
+mod signals;
+
 use crate::{
-    features::{self, Signals},
+    features,
     feedback::AxisState,
     math::{clamp, finite_or_zero},
-    model::{Card, Interpolation, MAX_AXES, MAX_ERRORS, MAX_FEATURES, MAX_OUTPUTS, Model, Refusal, SignalTable},
+    model::{Interpolation, MAX_AXES, MAX_ERRORS, MAX_FEATURES, MAX_OUTPUTS, Model, Refusal, SignalTable},
     network::{MAX_SCRATCH, Network, Scratch},
     preview::{EndRule, Preview},
 };
+
+use signals::{History, View, base_channels, same_signals};
 
 /// Sub-rate ticks of measured and reference history that features can read.
 pub const HISTORY: usize = 16;
@@ -33,32 +37,6 @@ impl Lanes {
     pub const BOTH: Self = Self { network: true, feedback: true };
     /// No lane: the loop gets the desired reference, to the bit.
     pub const NONE: Self = Self { network: false, feedback: false };
-}
-
-/// Values at sub-rate ticks; what is older or newer than stored gives the nearest.
-type History<const C: usize> = Preview<C, HISTORY>;
-
-/// What the features of one inference see.
-struct View<'a, const D: usize, const M: usize, const R: usize, const N: usize> {
-    desired: &'a Preview<D, N>,
-    measured: &'a History<M>,
-    references: &'a History<R>,
-    divisor: i32,
-}
-
-impl<const D: usize, const M: usize, const R: usize, const N: usize> Signals for View<'_, D, M, R, N> {
-    #[inline]
-    fn desired(&self, tick: i32, channel: usize) -> f32 {
-        self.desired.channel(tick, channel)
-    }
-    #[inline]
-    fn measured(&self, tick: i32, channel: usize) -> f32 {
-        self.measured.channel(tick.div_euclid(self.divisor.max(1)), channel)
-    }
-    #[inline]
-    fn reference(&self, tick: i32, channel: usize) -> f32 {
-        self.references.channel(tick.div_euclid(self.divisor.max(1)), channel)
-    }
 }
 
 /// Adapter for a loop with `D` desired, `M` measured and `R` reference channels, and a scratch of `S` words for the network (without a
@@ -153,7 +131,7 @@ impl<'m, const D: usize, const M: usize, const R: usize, const S: usize> Adapter
         self.saturations
     }
 
-    /// One reference tick: the reference that the loop shall track. `preview` should reach [`Card::preview_span`]'s future ahead;
+    /// One reference tick: the reference that the loop shall track. `preview` should reach [`crate::model::Card::preview_span`]'s future ahead;
     /// what is missing is taken as the trajectory's end.
     pub fn step<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M]) -> [f32; R] {
         let desired = preview.sample(tick);
@@ -340,29 +318,4 @@ impl<'m, const D: usize, const M: usize, const R: usize, const S: usize> Adapter
             }
         }
     }
-}
-
-/// Desired channel of the same name for each reference channel.
-pub fn base_channels<const R: usize>(table: &SignalTable<'_>) -> [usize; R] {
-    core::array::from_fn(|r| {
-        let name = table.reference.get(r).map(|channel| channel.name);
-        table.desired.iter().position(|desired| Some(desired.name) == name).unwrap_or(0)
-    })
-}
-
-fn same_signals(card: &Card<'_>, table: &SignalTable<'_>, counts: [usize; 3]) -> Result<(), Refusal> {
-    let pairs = [
-        ("desired", &card.signals.desired, &table.desired),
-        ("measured", &card.signals.measured, &table.measured),
-        ("reference", &card.signals.reference, &table.reference),
-    ];
-    for ((signal, model, application), count) in pairs.into_iter().zip(counts) {
-        let differs = model.iter().zip(application).position(|(a, b)| a != b);
-        let length =
-            (model.len() != application.len() || model.len() != count).then_some(model.len().min(application.len()).min(count));
-        if let Some(channel) = differs.or(length) {
-            return Err(Refusal::Signal { signal, channel: channel as u8 });
-        }
-    }
-    Ok(())
 }

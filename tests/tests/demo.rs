@@ -95,9 +95,15 @@ fn the_network_earns_its_place_against_ridge_regression() {
     assert!(over("crazyflie", "clean", 1.7) >= 1.5);
 }
 
+/// At 12 m/s² motors saturate in some strokes, which neither lane can mend; the feedback lane must not make them worse.
 #[test]
 fn fast_flights_keep_the_gain_of_both_lanes() {
-    at_least(row("crazyflie", "lab", 1.7, Method::FullInt8), 95.5, 84.0);
+    for vehicle in VEHICLES {
+        for condition in ["lab", "rough"] {
+            let [network, both] = [Method::NetInt8, Method::FullInt8].map(|method| row(vehicle, condition, 1.7, method));
+            at_least(both, network.reduction_mean + 0.5, 84.0);
+        }
+    }
 }
 
 /// The flatness comparison has a feedback lane of its own, chosen for it with wider clamps.

@@ -1,0 +1,64 @@
+//! What an adapter reads: the application's channels, matched by name with the model's, and their past at the sub-rate.
+//!
+//! *in* signal tables, previews and histories; *out* what features ask for; *never* a model between other channels than the
+//! application's; *source* the signal tables of [`crate::model`].
+
+use crate::{
+    features::Signals,
+    model::{Card, Refusal, SignalTable},
+    preview::Preview,
+};
+
+use super::HISTORY;
+
+/// Values at sub-rate ticks; what is older or newer than stored gives the nearest.
+pub(super) type History<const C: usize> = Preview<C, HISTORY>;
+
+/// What the features of one inference see.
+pub(super) struct View<'a, const D: usize, const M: usize, const R: usize, const N: usize> {
+    pub(super) desired: &'a Preview<D, N>,
+    pub(super) measured: &'a History<M>,
+    pub(super) references: &'a History<R>,
+    pub(super) divisor: i32,
+}
+
+impl<const D: usize, const M: usize, const R: usize, const N: usize> Signals for View<'_, D, M, R, N> {
+    #[inline]
+    fn desired(&self, tick: i32, channel: usize) -> f32 {
+        self.desired.channel(tick, channel)
+    }
+    #[inline]
+    fn measured(&self, tick: i32, channel: usize) -> f32 {
+        self.measured.channel(tick.div_euclid(self.divisor.max(1)), channel)
+    }
+    #[inline]
+    fn reference(&self, tick: i32, channel: usize) -> f32 {
+        self.references.channel(tick.div_euclid(self.divisor.max(1)), channel)
+    }
+}
+
+/// Desired channel of the same name for each reference channel.
+pub(super) fn base_channels<const R: usize>(table: &SignalTable<'_>) -> [usize; R] {
+    core::array::from_fn(|r| {
+        let name = table.reference.get(r).map(|channel| channel.name);
+        table.desired.iter().position(|desired| Some(desired.name) == name).unwrap_or(0)
+    })
+}
+
+/// Refuses a model whose channels are not the application's.
+pub(super) fn same_signals(card: &Card<'_>, table: &SignalTable<'_>, counts: [usize; 3]) -> Result<(), Refusal> {
+    let pairs = [
+        ("desired", &card.signals.desired, &table.desired),
+        ("measured", &card.signals.measured, &table.measured),
+        ("reference", &card.signals.reference, &table.reference),
+    ];
+    for ((signal, model, application), count) in pairs.into_iter().zip(counts) {
+        let differs = model.iter().zip(application).position(|(a, b)| a != b);
+        let length =
+            (model.len() != application.len() || model.len() != count).then_some(model.len().min(application.len()).min(count));
+        if let Some(channel) = differs.or(length) {
+            return Err(Refusal::Signal { signal, channel: channel as u8 });
+        }
+    }
+    Ok(())
+}
