@@ -303,7 +303,7 @@ fn flown(
 fn worst_to_answer_for(baseline: &[f64], network_alone: &[f64], errors: &[f64]) -> f64 {
     let flights = baseline.iter().zip(network_alone).zip(errors);
     let answerable = flights.filter(|((baseline, alone), _)| alone <= baseline);
-    answerable.map(|((baseline, _), error)| 100.0 * (1.0 - error / baseline)).fold(f64::INFINITY, f64::min)
+    answerable.map(|((baseline, _), error)| 100.0 * (1.0 - error / baseline)).fold(100.0, f64::min)
 }
 
 /// A nominal flight may lose this much, per cent of the baseline's error, against the network lane alone; of what the worst one loses
@@ -366,4 +366,19 @@ fn best(candidates: &[Candidate], scores: &[Score], wanted: &dyn Fn(&Score) -> b
         score: score.mean,
         worst: score.worst,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lane_answers_for_the_flights_that_the_network_alone_can_fly() {
+        let baseline = [0.1, 0.1, 0.1];
+        assert_eq!(worst_to_answer_for(&baseline, &[0.05, 0.05, 0.05], &[0.01, 0.2, 0.02]), -100.0);
+        assert_eq!(worst_to_answer_for(&baseline, &[0.05, 2.0, 0.05], &[0.01, 3.0, 0.05]), 50.0);
+        assert_eq!(worst_to_answer_for(&baseline, &[2.0; 3], &[3.0; 3]), 100.0);
+        // A tumble that only the lane brings about.
+        assert!(worst_to_answer_for(&baseline, &[0.05; 3], &[0.01, f64::INFINITY, 0.01]) < 0.0);
+    }
 }
