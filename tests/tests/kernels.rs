@@ -39,7 +39,7 @@ fn case(random: &mut Xoshiro256PlusPlus) -> Case {
     if kind == 2 {
         return float_case(random, offset);
     }
-    let (width, finish) = (if kind == 0 { Width::Int8 } else { Width::Int16 }, random.random_range(0..3u32));
+    let (width, finish) = (if kind == 0 { Width::Int8 } else { Width::Int16 }, random.random_range(0..4u32));
     let (words, blocks) = (2 * random.random_range(1..=34usize), random.random_range(1..=6usize));
     let limit = [32_767, 2_047, 1, random.random_range(1..=32_767u32)][random.random_range(0..4usize)];
     let extreme = random.random::<bool>();
@@ -51,7 +51,8 @@ fn case(random: &mut Xoshiro256PlusPlus) -> Case {
         // From multipliers that leave nothing to those that saturate everything, of either sign.
         stream.extend((0..ROWS).map(|_| (random.random::<u32>() as i32 >> random.random_range(0..31u32)) as u32));
     }
-    let finishes = [Finish::Codes { limit: limit as u16 }, Finish::Preactivations, Finish::Sums];
+    let whole = limit as u16;
+    let finishes = [Finish::Codes { limit: whole }, Finish::Tanh { limit: whole }, Finish::Sums, Finish::Linear { limit: whole }];
     let finish_now = finishes[finish as usize];
     let mut expected = vec![0xdead_beef; blocks * finish_now.words()];
     portable::integer(width, &little_endian(&stream), &inputs, finish_now, &mut expected);

@@ -1,7 +1,7 @@
 //! Dense layers in f32.
 
 use super::{Activation, ROWS, kernel, tanh::tanh};
-use crate::model::{Blob, LayerLayout, MAX_OUTPUTS, Refusal, Section, Words};
+use crate::model::{Blob, LayerLayout, Refusal, Section, Words};
 
 /// Inputs are padded to a multiple of this.
 const PADDING: usize = 2;
@@ -40,7 +40,7 @@ impl<'a> Layer<'a> {
     }
 
     #[inline(always)]
-    fn hidden(&self, inputs: &[u32], outputs: &mut [u32]) {
+    fn run(&self, inputs: &[u32], outputs: &mut [u32]) {
         let (Some(inputs), Some(outputs)) = (inputs.get(..self.inputs.into()), outputs.get_mut(..self.outputs.into())) else {
             return;
         };
@@ -58,24 +58,25 @@ impl<'a> Layer<'a> {
         }
     }
 
-    /// Adds the outputs of the last layer, or of the skip.
+    /// Writes the outputs of the skip.
     #[inline(never)]
-    pub(super) fn outputs(&self, inputs: &[u32], result: &mut [f32; MAX_OUTPUTS]) {
+    pub(super) fn outputs(&self, inputs: &[u32], result: &mut [f32]) {
         let mut outputs = [0; ROWS];
-        if let (Some(inputs), Some(outputs)) = (inputs.get(..self.inputs.into()), outputs.get_mut(..self.outputs.into())) {
-            kernel::float(self.stream.all(), inputs, false, outputs);
-        }
+        self.run(inputs, &mut outputs);
         for (result, output) in result.iter_mut().zip(outputs) {
-            *result += f32::from_bits(output);
+            *result = f32::from_bits(output);
         }
     }
 }
 
-/// Runs the hidden layers on the inputs in `current`; gives the last one's outputs.
-#[inline(never)]
-pub(super) fn hidden<'s>(layers: &[Layer<'_>], mut current: &'s mut [u32], mut other: &'s mut [u32]) -> &'s [u32] {
+/// Runs all layers on the inputs in `current`; gives the last one's outputs.
+#[inline(always)]
+pub(super) fn outputs<'s>(layers: &[Layer<'_>], mut current: &'s mut [u32], mut other: &'s mut [u32]) -> &'s [u32] {
+    if layers.is_empty() {
+        current.fill(0);
+    }
     for layer in layers {
-        layer.hidden(current, other);
+        layer.run(current, other);
         core::mem::swap(&mut current, &mut other);
     }
     current

@@ -1,7 +1,7 @@
 //! The kernels in safe Rust, for every machine: the definition of the bits that the assembly must give.
 
 use super::{Finish, Width, float_blocks};
-use crate::network::ROWS;
+use crate::network::{ROWS, tanh_code};
 
 /// Upper bits of accumulator × multiplier + 2³¹.
 #[inline(always)]
@@ -28,7 +28,7 @@ pub const fn pair(low: i16, high: i16) -> u32 {
     low as u16 as u32 | (high as u16 as u32) << 16
 }
 
-/// [`super::integer`] on any machine.
+/// A layer of [`super::Integer`] on any machine: `outputs` are all that it has.
 #[inline(never)]
 pub fn integer(width: Width, stream: &[[u8; 4]], inputs: &[u32], finish: Finish, outputs: &mut [u32]) {
     let blocks = stream.chunks_exact(width.block(inputs.len()));
@@ -59,8 +59,12 @@ pub fn integer(width: Width, stream: &[[u8; 4]], inputs: &[u32], finish: Finish,
                 let code = |row| code(row).clamp(0, i32::from(limit)) as i16;
                 outputs.iter_mut().enumerate().for_each(|(i, word)| *word = pair(code(2 * i), code(2 * i + 1)));
             }
-            Finish::Preactivations => {
-                let code = |row| code(row).clamp(i32::from(i16::MIN), i32::from(i16::MAX)) as i16;
+            Finish::Tanh { limit } => {
+                let code = |row| tanh_code(code(row).clamp(i32::from(i16::MIN), i32::from(i16::MAX)) as i16, limit);
+                outputs.iter_mut().enumerate().for_each(|(i, word)| *word = pair(code(2 * i), code(2 * i + 1)));
+            }
+            Finish::Linear { limit } => {
+                let code = |row| code(row).clamp(-i32::from(limit), i32::from(limit)) as i16;
                 outputs.iter_mut().enumerate().for_each(|(i, word)| *word = pair(code(2 * i), code(2 * i + 1)));
             }
             Finish::Sums => outputs.iter_mut().zip(sums).for_each(|(word, sum)| *word = sum as u32),
