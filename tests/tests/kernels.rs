@@ -63,7 +63,7 @@ fn case(random: &mut Xoshiro256PlusPlus) -> Case {
 fn float_case(random: &mut Xoshiro256PlusPlus, offset: u32) -> Case {
     let most = if random.random::<bool>() { 8 } else { 60 };
     let (words, rows) = (2 * random.random_range(1..=34usize), float_rows(random.random_range(1..=most)));
-    let relu = random.random::<bool>();
+    let finish = random.random_range(0..3u32);
     // Normal numbers of very different size, and zeros of both signs.
     let mut number = || match random.random_range(0..20) {
         0 => 0.0f32,
@@ -73,8 +73,11 @@ fn float_case(random: &mut Xoshiro256PlusPlus, offset: u32) -> Case {
     let inputs: Vec<u32> = (0..words).map(|_| number().to_bits()).collect();
     let stream: Vec<u32> = (0..rows * (1 + words)).map(|_| number().to_bits()).collect();
     let mut expected = vec![0xdead_beef; rows];
-    portable::float(&little_endian(&stream), &inputs, relu, &mut expected);
-    let header = [2, words as u32, rows as u32, u32::from(relu), 0, stream.len() as u32, offset, 0];
+    portable::float(&little_endian(&stream), &inputs, finish == 1, &mut expected);
+    if finish == 2 {
+        portable::tanh(&mut expected);
+    }
+    let header = [2, words as u32, rows as u32, finish, 0, stream.len() as u32, offset, 0];
     Case { header, inputs, stream, expected }
 }
 

@@ -1,6 +1,6 @@
 //! Dense layers in f32.
 
-use super::{Activation, ROWS, kernel, tanh::tanh};
+use super::{Activation, ROWS, kernel};
 use crate::model::{Blob, LayerLayout, Refusal, Section, Words};
 
 /// Inputs are padded to a multiple of this.
@@ -46,15 +46,7 @@ impl<'a> Layer<'a> {
         };
         kernel::float(self.stream.all(), inputs, self.activation == Activation::Relu, outputs);
         if self.activation == Activation::Tanh {
-            Self::activate(outputs);
-        }
-    }
-
-    /// Tanh, two at a time, so that one's arithmetic fills the other's stalls; the rows are even in number.
-    #[inline(never)]
-    fn activate(words: &mut [u32]) {
-        for pair in words.as_chunks_mut::<2>().0 {
-            *pair = pair.map(|word| tanh(f32::from_bits(word)).to_bits());
+            kernel::tanh(outputs);
         }
     }
 

@@ -126,21 +126,15 @@ pub(super) struct Encoding<'a> {
 #[inline(always)]
 pub(super) fn encode(encoding: &Encoding<'_>, inputs: &[f32], layers: &[Layer<'_>], normalised: &mut [u32], codes: &mut [u32]) {
     let limit = layers.first().map_or(0, |layer| i32::from(layer.limit));
-    // The paddings' places, before they are written as far as there are inputs.
-    for last in [codes.get_mut((inputs.len().next_multiple_of(INPUT_PADDING) / 2).saturating_sub(1)), normalised.get_mut(inputs.len())] {
-        if let Some(last) = last {
-            *last = 0;
-        }
-    }
     let normalisation = encoding.mean.iter().zip(encoding.reciprocal_scale.iter());
-    let mut places = inputs.iter().zip(normalisation).zip(normalised).map(|((input, (mean, reciprocal)), place)| {
-        let value = (*input - mean) * reciprocal;
-        *place = value.to_bits();
-        code(value * encoding.code, limit)
-    });
-    for word in codes {
-        let Some(low) = places.next() else { return };
-        *word = portable::pair(low, places.next().unwrap_or(0));
+    for ((place, input), (mean, reciprocal)) in normalised.iter_mut().zip(inputs).zip(normalisation) {
+        *place = ((*input - mean) * reciprocal).to_bits();
+    }
+    normalised.iter_mut().skip(inputs.len()).take(INPUT_PADDING - 1).for_each(|place| *place = 0);
+    let pairs = normalised.as_chunks::<2>().0.iter().take(inputs.len().next_multiple_of(INPUT_PADDING) / 2);
+    for (word, [low, high]) in codes.iter_mut().zip(pairs) {
+        let [low, high] = [*low, *high].map(|value| code(f32::from_bits(value) * encoding.code, limit));
+        *word = portable::pair(low, high);
     }
 }
 

@@ -176,3 +176,11 @@ pub fn float(stream: &[[u8; 4]], inputs: &[u32], relu: bool, outputs: &mut [u32]
     }
     portable::float(stream, inputs, relu, outputs);
 }
+
+/// The [`tanh`](super::tanh()) of each f32.
+#[inline]
+pub fn tanh(words: &mut [u32]) {
+    #[cfg(cortex_m4)]
+    let words = cortex_m4::tanh(words);
+    portable::tanh(words);
+}

@@ -154,12 +154,11 @@ impl<'a> Network<'a> {
         }
     }
 
-    /// Writes the skip's outputs, or zeros.
+    /// Writes the skip's outputs, if there is one.
     #[inline(always)]
     fn skip(&self, normalised: &[u32], outputs: &mut [f32]) {
-        match &self.skip {
-            Some(skip) => skip.outputs(normalised, outputs),
-            None => outputs.iter_mut().take(self.output_scale.len()).for_each(|output| *output = 0.0),
+        if let Some(skip) = &self.skip {
+            skip.outputs(normalised, outputs);
         }
     }
 
@@ -168,7 +167,8 @@ impl<'a> Network<'a> {
     fn denormalise(&self, values: impl Iterator<Item = f32>, outputs: &mut [f32]) {
         let denormalisation = self.output_scale.iter().zip(self.output_mean.iter());
         for ((output, value), (scale, mean)) in outputs.iter_mut().zip(values).zip(denormalisation) {
-            *output = (*output + value) * scale + mean;
+            let skip = if self.skip.is_some() { *output } else { 0.0 };
+            *output = (skip + value) * scale + mean;
         }
     }
 }

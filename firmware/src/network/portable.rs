@@ -1,7 +1,7 @@
 //! The kernels in safe Rust, for every machine: the definition of the bits that the assembly must give.
 
 use super::{Finish, Width, float_blocks};
-use crate::network::{ROWS, tanh_code};
+use crate::network::{self, ROWS, tanh_code};
 
 /// Upper bits of accumulator × multiplier + 2³¹.
 #[inline(always)]
@@ -114,4 +114,12 @@ fn float_part<const N: usize>(stream: &[[u8; 4]], inputs: &[u32], relu: bool, ou
 #[inline(always)]
 const fn rectified(bits: u32) -> u32 {
     bits & !((bits as i32 >> 31) as u32)
+}
+
+/// [`super::tanh`] on any machine.
+#[inline(always)]
+pub fn tanh(words: &mut [u32]) {
+    for word in words {
+        *word = network::tanh(f32::from_bits(*word)).to_bits();
+    }
 }

@@ -81,9 +81,10 @@ const SATURATED: f32 = 9.0;
 
 /// Coefficients of 1, d, d², d³ around i / 16, on a boundary of a flash line.
 #[repr(align(16))]
-struct Cubic([f32; 4]);
+pub(super) struct Cubic([f32; 4]);
 
-static CUBIC: [Cubic; SATURATED as usize * CUBICS + 1] = cubics();
+/// The cubics, in the order of i.
+pub(super) static CUBIC: [Cubic; SATURATED as usize * CUBICS + 1] = cubics();
 
 const fn cubics() -> [Cubic; SATURATED as usize * CUBICS + 1] {
     let mut cubics = [const { Cubic([0.0; 4]) }; SATURATED as usize * CUBICS + 1];

@@ -1,7 +1,7 @@
 //! One case after the other, from the file.
 //!
 //! A case is eight u32 and data, all little-endian: kind (0: int8, 1: int16, 2: float), words of inputs, words of outputs, finish (integers: 0
-//! rectified codes, 1 tanh, 2 sums, 3 linear codes; float: 1 with ReLU), largest code, words of the stream, byte offset of the stream from a word, zero; then
+//! rectified codes, 1 tanh, 2 sums, 3 linear codes; float: 1 with ReLU, 2 with tanh), largest code, words of the stream, byte offset of the stream from a word, zero; then
 //! inputs and stream. Kind 9 ends the file.
 
 use core::fmt;
@@ -80,6 +80,10 @@ pub(crate) fn run() -> Result<Counts, Error> {
         if kind == 2 {
             kernel::float(stream, inputs, finish == 1, found);
             portable::float(stream, inputs, finish == 1, twin);
+            if finish == 2 {
+                kernel::tanh(found);
+                portable::tanh(twin);
+            }
         } else {
             let width = if kind == 0 { Width::Int8 } else { Width::Int16 };
             let finish = match finish {
