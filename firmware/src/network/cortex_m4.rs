@@ -203,11 +203,51 @@ macro_rules! int16_chunk {
 macro_rules! four_tanh {
     ($a:literal, $b:literal, $c:literal, $d:literal) => {
         concat!(
-            "lsr.w r0, ", $a, ", #8\nlsr.w r1, ", $b, ", #8\nlsr.w r2, ", $c, ", #8\nlsr.w r3, ", $d, ", #8\n",
+            "lsr.w r0, ",
+            $a,
+            ", #8\nlsr.w r1, ",
+            $b,
+            ", #8\nlsr.w r2, ",
+            $c,
+            ", #8\nlsr.w r3, ",
+            $d,
+            ", #8\n",
             "ldr.w r0, [r5, r0, lsl #2]\nldr.w r1, [r5, r1, lsl #2]\nldr.w r2, [r5, r2, lsl #2]\nldr.w r3, [r5, r3, lsl #2]\n",
-            "lsl.w ", $a, ", ", $a, ", #7\nlsl.w ", $b, ", ", $b, ", #7\nlsl.w ", $c, ", ", $c, ", #7\nlsl.w ", $d, ", ", $d, ", #7\n",
-            "smlabb ", $a, ", r0, ", $a, ", r0\nsmlabb ", $b, ", r1, ", $b, ", r1\n",
-            "smlabb ", $c, ", r2, ", $c, ", r2\nsmlabb ", $d, ", r3, ", $d, ", r3\n",
+            "lsl.w ",
+            $a,
+            ", ",
+            $a,
+            ", #7\nlsl.w ",
+            $b,
+            ", ",
+            $b,
+            ", #7\nlsl.w ",
+            $c,
+            ", ",
+            $c,
+            ", #7\nlsl.w ",
+            $d,
+            ", ",
+            $d,
+            ", #7\n",
+            "smlabb ",
+            $a,
+            ", r0, ",
+            $a,
+            ", r0\nsmlabb ",
+            $b,
+            ", r1, ",
+            $b,
+            ", r1\n",
+            "smlabb ",
+            $c,
+            ", r2, ",
+            $c,
+            ", r2\nsmlabb ",
+            $d,
+            ", r3, ",
+            $d,
+            ", r3\n",
         )
     };
 }
@@ -348,53 +388,70 @@ unsafe extern "C" fn int16(shape: &Shape, stream: *const [u8; 4], inputs: *const
     integer_kernel!(int16_chunk!())
 }
 
-/// Arguments of the float kernel, in the order in which it loads them.
+/// A layer's part of the float kernels' arguments, in the order in which they load it.
+#[derive(Clone, Debug)]
 #[repr(C)]
-struct Float {
-    stream: *const [u8; 4],
-    inputs: *const u32,
-    outputs: *mut u32,
-    /// Behind the outputs of the blocks of twelve rows.
-    twelves_end: *const u32,
+struct FloatShape {
+    /// Bytes of the outputs of the blocks of twelve rows.
+    twelves: u32,
     /// Pairs of inputs that are not in whole groups of eight: 0 to 3.
-    pairs: usize,
-    inputs_end: *const u32,
+    pairs: u32,
+    /// Bytes of the inputs.
+    inputs: u32,
     /// 0: ReLU.
     linear: u32,
-    outputs_end: *const u32,
+    /// Bytes of all outputs.
+    outputs: u32,
 }
 
-/// [`super::float`], if the arguments suit the kernel; else `false` and nothing has been done.
-pub(super) fn float(stream: &[[u8; 4]], inputs: &[u32], relu: bool, outputs: &mut [u32]) -> bool {
-    let Some([twelves, _, sixes]) = float_blocks(outputs.len()) else { return false };
-    let pairs = !inputs.is_empty() && inputs.len().is_multiple_of(2);
-    if !(pairs && aligned(stream) && stream.len() == outputs.len() * (1 + inputs.len())) {
-        return false;
+/// A float layer that suits the kernels.
+#[derive(Clone, Debug)]
+pub(super) struct Float<'a> {
+    /// Exactly the blocks that `shape` says, on a word boundary.
+    stream: &'a [[u8; 4]],
+    shape: FloatShape,
+    six: bool,
+}
+
+impl<'a> Float<'a> {
+    /// A layer of so many words, if it suits the kernels.
+    pub(super) fn new(stream: &'a [[u8; 4]], inputs: usize, relu: bool, outputs: usize) -> Option<Self> {
+        let [twelves, _, sixes] = float_blocks(outputs)?;
+        let pairs = inputs > 0 && inputs.is_multiple_of(2);
+        if !(pairs && aligned(stream) && stream.len() == outputs * (1 + inputs)) {
+            return None;
+        }
+        let shape = FloatShape {
+            twelves: 48 * twelves as u32,
+            pairs: (inputs % 8 / 2) as u32,
+            inputs: 4 * inputs as u32,
+            linear: u32::from(!relu),
+            outputs: 4 * outputs as u32,
+        };
+        Some(Self { stream, shape, six: sixes > 0 })
     }
-    let left = inputs.len() % 8 / 2;
-    let (inputs, outputs) = (inputs.as_ptr_range(), outputs.as_mut_ptr_range());
-    let arguments = Float {
-        stream: stream.as_ptr(),
-        inputs: inputs.start,
-        outputs: outputs.start,
-        twelves_end: outputs.start.wrapping_add(twelves * 12),
-        pairs: left,
-        inputs_end: inputs.end,
-        linear: u32::from(!relu),
-        outputs_end: outputs.end,
-    };
-    // SAFETY: the pointers come from live slices, `stream` is aligned to words, and the three lengths fit together (checked above):
-    // `outputs` is exactly one block of six, or `twelves` blocks of twelve and the rest of eight rows, for each of which the kernel reads its part of the stream
-    // and all of `inputs` (`pairs` pairs, then whole groups of eight). It writes exactly `outputs` and keeps the registers that the calling
-    // convention protects.
-    unsafe {
-        if sixes > 0 {
-            float_six_kernel(&arguments);
-        } else {
-            float_kernel(&arguments);
+
+    /// [`super::Float::run`].
+    #[inline(always)]
+    pub(super) fn run(&self, inputs: &[u32], outputs: &mut [u32]) {
+        let shape = &self.shape;
+        if inputs.len() < shape.inputs as usize / 4 || outputs.len() < shape.outputs as usize / 4 {
+            return;
+        }
+        let (stream, from, to) = (self.stream.as_ptr(), inputs.as_ptr(), outputs.as_mut_ptr());
+        // SAFETY: the pointers come from live slices. `new`, which alone makes a shape, has checked that the stream is aligned to words and
+        // that the three lengths fit together: `shape.outputs` are exactly one block of six, or the blocks of twelve and the rest of eight
+        // rows, for each of which the kernel reads its part of the stream and all of `shape.inputs` (`pairs` pairs, then whole groups of
+        // eight). It writes exactly `shape.outputs`. Both are inside of the slices (checked above). It keeps the registers that the calling
+        // convention protects.
+        unsafe {
+            if self.six {
+                float_six_kernel(shape, stream, from, to);
+            } else {
+                float_kernel(shape, stream, from, to);
+            }
         }
     }
-    true
 }
 
 /// Instructions of three operands.
@@ -477,16 +534,23 @@ macro_rules! float_relu {
 }
 
 /// # Safety
-/// `arguments` must describe live, aligned memory of fitting lengths.
+/// `stream`, `inputs` and `outputs` must point to live, aligned memory as long as `shape` says, which [`Float::new`] made.
 #[unsafe(naked)]
-unsafe extern "C" fn float_kernel(arguments: &Float) {
+unsafe extern "C" fn float_kernel(shape: &FloatShape, stream: *const [u8; 4], inputs: *const u32, outputs: *mut u32) {
     naked_asm!(
         ".arch armv7e-m",
         ".fpu fpv4-sp-d16",
         ".balign 4",
         "push {{r4-r11, lr}}",
         "vpush {{s16-s31}}",
-        "ldm.w r0, {{r0-r3, r8-r11}}",
+        // r0 becomes the stream, r1 the inputs, r2 the outputs, r3 the end of the twelves' outputs.
+        "ldm.w r0, {{r7-r11}}",
+        "mov.w r0, r1",
+        "mov.w r1, r2",
+        "mov.w r2, r3",
+        "add.w r3, r3, r7",
+        "add.w r9, r9, r1",
+        "add.w r11, r11, r2",
         "cmp.w r2, r3",
         "beq.w 50f",
         "adr.w r4, 90f",
@@ -593,14 +657,21 @@ unsafe extern "C" fn float_kernel(arguments: &Float) {
 /// # Safety
 /// As for [`float_kernel`].
 #[unsafe(naked)]
-unsafe extern "C" fn float_six_kernel(arguments: &Float) {
+unsafe extern "C" fn float_six_kernel(shape: &FloatShape, stream: *const [u8; 4], inputs: *const u32, outputs: *mut u32) {
     naked_asm!(
         ".arch armv7e-m",
         ".fpu fpv4-sp-d16",
         ".balign 4",
         "push {{r4-r11, lr}}",
         "vpush {{s16-s31}}",
-        "ldm.w r0, {{r0-r3, r8-r11}}",
+        // r0 becomes the stream, r1 the inputs, r2 the outputs, r3 the end of the twelves' outputs.
+        "ldm.w r0, {{r7-r11}}",
+        "mov.w r0, r1",
+        "mov.w r1, r2",
+        "mov.w r2, r3",
+        "add.w r3, r3, r7",
+        "add.w r9, r9, r1",
+        "add.w r11, r11, r2",
         "adr.w r4, 90f",
         "ldr.w lr, [r4, r8, lsl #2]",
         "vldm r0!, {{s0-s5}}",

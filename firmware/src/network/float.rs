@@ -1,7 +1,7 @@
 //! Dense layers in f32.
 
 use super::{Activation, ROWS, kernel};
-use crate::model::{Blob, LayerLayout, Refusal, Section, Words};
+use crate::model::{Blob, LayerLayout, Refusal, Section};
 
 /// Inputs are padded to a multiple of this.
 const PADDING: usize = 2;
@@ -9,10 +9,9 @@ const PADDING: usize = 2;
 /// One checked layer.
 #[derive(Debug)]
 pub(super) struct Layer<'a> {
-    stream: Words<'a>,
-    inputs: u16,
+    kernel: kernel::Float<'a>,
     outputs: u16,
-    activation: Activation,
+    tanh: bool,
 }
 
 impl<'a> Layer<'a> {
@@ -35,17 +34,17 @@ impl<'a> Layer<'a> {
     ) -> Result<Self, Refusal> {
         let (inputs, outputs) = (inputs.next_multiple_of(PADDING), kernel::float_rows(outputs));
         blob.floats(section, outputs * (1 + inputs), what)?;
-        let stream = blob.words(section, outputs * (1 + inputs), what)?;
-        Ok(Self { stream, inputs: inputs as u16, outputs: outputs as u16, activation })
+        let stream = blob.words(section, outputs * (1 + inputs), what)?.all();
+        let kernel = kernel::Float::new(stream, inputs as u16, activation == Activation::Relu, outputs as u16);
+        Ok(Self { kernel, outputs: outputs as u16, tanh: activation == Activation::Tanh })
     }
 
     #[inline(always)]
     fn run(&self, inputs: &[u32], outputs: &mut [u32]) {
-        let (Some(inputs), Some(outputs)) = (inputs.get(..self.inputs.into()), outputs.get_mut(..self.outputs.into())) else {
-            return;
-        };
-        kernel::float(self.stream.all(), inputs, self.activation == Activation::Relu, outputs);
-        if self.activation == Activation::Tanh {
+        self.kernel.run(inputs, outputs);
+        if self.tanh
+            && let Some(outputs) = outputs.get_mut(..self.outputs.into())
+        {
             kernel::tanh(outputs);
         }
     }

@@ -130,8 +130,14 @@ pub(super) fn encode(encoding: &Encoding<'_>, inputs: &[f32], layers: &[Layer<'_
     for ((place, input), (mean, reciprocal)) in normalised.iter_mut().zip(inputs).zip(normalisation) {
         *place = ((*input - mean) * reciprocal).to_bits();
     }
-    normalised.iter_mut().skip(inputs.len()).take(INPUT_PADDING - 1).for_each(|place| *place = 0);
-    let pairs = normalised.as_chunks::<2>().0.iter().take(inputs.len().next_multiple_of(INPUT_PADDING) / 2);
+    let mut padded = inputs.len();
+    while !padded.is_multiple_of(INPUT_PADDING) {
+        if let Some(place) = normalised.get_mut(padded) {
+            *place = 0;
+        }
+        padded += 1;
+    }
+    let pairs = normalised.as_chunks::<2>().0.iter().take(padded / 2);
     for (word, [low, high]) in codes.iter_mut().zip(pairs) {
         let [low, high] = [*low, *high].map(|value| code(f32::from_bits(value) * encoding.code, limit));
         *word = portable::pair(low, high);

@@ -167,14 +167,44 @@ pub const fn float_blocks(rows: usize) -> Option<[usize; 3]> {
     Some([(rows - 8 * eights) / 12, eights, 0])
 }
 
-/// Runs a float layer. `inputs` are the bits of an even number of f32, `outputs` those of all the rows in `stream`.
-#[inline]
-pub fn float(stream: &[[u8; 4]], inputs: &[u32], relu: bool, outputs: &mut [u32]) {
+/// A float layer, checked once.
+#[derive(Clone, Debug)]
+pub struct Float<'a> {
+    stream: &'a [[u8; 4]],
+    relu: bool,
+    inputs: u16,
+    outputs: u16,
     #[cfg(cortex_m4)]
-    if cortex_m4::float(stream, inputs, relu, outputs) {
-        return;
+    assembly: Option<cortex_m4::Float<'a>>,
+}
+
+impl<'a> Float<'a> {
+    /// A layer of `inputs` words (an even number) and `outputs` rows, those of [`float_rows`].
+    pub fn new(stream: &'a [[u8; 4]], inputs: u16, relu: bool, outputs: u16) -> Self {
+        #[cfg(cortex_m4)]
+        let assembly = cortex_m4::Float::new(stream, inputs.into(), relu, outputs.into());
+        Self {
+            stream,
+            relu,
+            inputs,
+            outputs,
+            #[cfg(cortex_m4)]
+            assembly,
+        }
     }
-    portable::float(stream, inputs, relu, outputs);
+
+    /// Reads the bits of f32 in the first words of `inputs` and writes the first ones of `outputs`; does nothing if either are too few.
+    #[inline(always)]
+    pub fn run(&self, inputs: &[u32], outputs: &mut [u32]) {
+        #[cfg(cortex_m4)]
+        if let Some(assembly) = &self.assembly {
+            assembly.run(inputs, outputs);
+            return;
+        }
+        if let (Some(inputs), Some(outputs)) = (inputs.get(..self.inputs.into()), outputs.get_mut(..self.outputs.into())) {
+            portable::float(self.stream, inputs, self.relu, outputs);
+        }
+    }
 }
 
 /// The [`tanh`](super::tanh()) of each f32.

@@ -131,8 +131,7 @@ impl<'a> Network<'a> {
                 self.denormalise(values.iter().map(|value| f32::from_bits(*value)), outputs);
             }
             Layers::Integer { code, layers } => {
-                let encoding =
-                    integer::Encoding { mean: self.mean, reciprocal_scale: self.reciprocal_scale, code: *code };
+                let encoding = integer::Encoding { mean: self.mean, reciprocal_scale: self.reciprocal_scale, code: *code };
                 integer::encode(&encoding, inputs, layers, back, front);
                 self.skip(back, outputs);
                 let sums = integer::sums(layers, front, back).iter().zip(integer::scales(layers));

@@ -81,7 +81,7 @@ fn multiply_add(weights: [i16; 2], input: u32, sum: i32) -> i32 {
     sum.wrapping_add(low).wrapping_add(high)
 }
 
-/// [`super::float`] on any machine.
+/// A layer of [`super::Float`] on any machine: `inputs` and `outputs` are all that it has.
 #[inline(never)]
 pub fn float(stream: &[[u8; 4]], inputs: &[u32], relu: bool, outputs: &mut [u32]) {
     let Some([twelves, _, sixes]) = float_blocks(outputs.len()) else { return };

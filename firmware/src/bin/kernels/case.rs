@@ -78,7 +78,7 @@ pub(crate) fn run() -> Result<Counts, Error> {
         found.fill(0xdead_beef);
         twin.fill(0xdead_beef);
         if kind == 2 {
-            kernel::float(stream, inputs, finish == 1, found);
+            kernel::Float::new(stream, inputs.len() as u16, finish == 1, found.len() as u16).run(inputs, found);
             portable::float(stream, inputs, finish == 1, twin);
             if finish == 2 {
                 kernel::tanh(found);
