@@ -39,7 +39,7 @@ fn case(random: &mut Xoshiro256PlusPlus) -> Case {
     if kind == 2 {
         return float_case(random, offset);
     }
-    let (width, finish) = (if kind == 0 { Width::Int8 } else { Width::Int16 }, random.random_range(0..3u32));
+    let (width, finish) = (if kind == 0 { Width::Int8 } else { Width::Int16 }, random.random_range(0..4u32));
     let (words, blocks) = (2 * random.random_range(1..=34usize), random.random_range(1..=6usize));
     let limit = [32_767, 2_047, 1, random.random_range(1..=32_767u32)][random.random_range(0..4usize)];
     let extreme = random.random::<bool>();
@@ -51,7 +51,8 @@ fn case(random: &mut Xoshiro256PlusPlus) -> Case {
         // From multipliers that leave nothing to those that saturate everything, of either sign.
         stream.extend((0..ROWS).map(|_| (random.random::<u32>() as i32 >> random.random_range(0..31u32)) as u32));
     }
-    let finishes = [Finish::Codes { limit: limit as u16 }, Finish::Preactivations, Finish::Sums];
+    let whole = limit as u16;
+    let finishes = [Finish::Codes { limit: whole }, Finish::Tanh { limit: whole }, Finish::Sums, Finish::Linear { limit: whole }];
     let finish_now = finishes[finish as usize];
     let mut expected = vec![0xdead_beef; blocks * finish_now.words()];
     portable::integer(width, &little_endian(&stream), &inputs, finish_now, &mut expected);
@@ -62,7 +63,7 @@ fn case(random: &mut Xoshiro256PlusPlus) -> Case {
 fn float_case(random: &mut Xoshiro256PlusPlus, offset: u32) -> Case {
     let most = if random.random::<bool>() { 8 } else { 60 };
     let (words, rows) = (2 * random.random_range(1..=34usize), float_rows(random.random_range(1..=most)));
-    let relu = random.random::<bool>();
+    let finish = random.random_range(0..3u32);
     // Normal numbers of very different size, and zeros of both signs.
     let mut number = || match random.random_range(0..20) {
         0 => 0.0f32,
@@ -72,8 +73,11 @@ fn float_case(random: &mut Xoshiro256PlusPlus, offset: u32) -> Case {
     let inputs: Vec<u32> = (0..words).map(|_| number().to_bits()).collect();
     let stream: Vec<u32> = (0..rows * (1 + words)).map(|_| number().to_bits()).collect();
     let mut expected = vec![0xdead_beef; rows];
-    portable::float(&little_endian(&stream), &inputs, relu, &mut expected);
-    let header = [2, words as u32, rows as u32, u32::from(relu), 0, stream.len() as u32, offset, 0];
+    portable::float(&little_endian(&stream), &inputs, finish == 1, &mut expected);
+    if finish == 2 {
+        portable::tanh(&mut expected);
+    }
+    let header = [2, words as u32, rows as u32, finish, 0, stream.len() as u32, offset, 0];
     Case { header, inputs, stream, expected }
 }
 

@@ -6,7 +6,7 @@
 //!
 //! # Integers
 //! Eight accumulators in r6-r12 and lr; r4 streams the weights, r5 the inputs; r0-r3 hold an input word and weights, or two input
-//! words while one gives way to the next. What a block needs only once waits in s0-s6 (1 cycle to fetch). Account for int8, of
+//! words while one gives way to the next. What a block needs only once waits in s0-s7 (1 cycle to fetch). Account for int8, of
 //! 4 inputs × 8 rows = 32 multiplications: 16 SMLAD, 8 LSL, 8 + 2 words loaded in three runs: 16 + 8 + 10 + 3 = 37 cycles; int16:
 //! 16 + 18 + 6 = 40. Five chunks are unrolled; their number's remainder decides where the first pass enters. A block adds about 65: 9 biases, 10 multipliers, 24 SMMLAR, USAT, PKHBT and UQSUB16, the rest control.
 //!
@@ -23,18 +23,21 @@ use super::{Finish, Width, float_blocks};
 /// Chunks of four inputs in the unrolled integer loops.
 const UNROLLED: usize = 5;
 
-/// Arguments of the integer kernels, in the order in which they load them.
+/// A layer's part of the integer kernels' arguments, in the order in which they load it.
+#[derive(Clone, Debug)]
 #[repr(C)]
-struct Integer {
-    stream: *const [u8; 4],
-    inputs: *const u32,
-    inputs_end: *const u32,
-    outputs: *mut u32,
-    outputs_end: *const u32,
-    /// Added to a code before USAT and subtracted after it, so that 16 bits saturate at the limit; 0: signed codes; 1: sums.
+struct Shape {
+    /// Bytes of the inputs and of the outputs.
+    inputs: u32,
+    outputs: u32,
+    /// Chunks to skip in the first pass of the unrolled loop.
+    skipped: u32,
+    /// Added to a code before USAT; 0: sums.
     offset: u32,
-    /// `offset` in both halves.
+    /// In both halves, subtracted after USAT, so that 16 bits saturate at a limit; 0: tanh.
     offsets: u32,
+    /// For tanh: twice the code of 1.
+    factor: u32,
 }
 
 /// Whether a stream lies on a word boundary, as LDM needs.
@@ -42,41 +45,70 @@ fn aligned(stream: &[[u8; 4]]) -> bool {
     stream.as_ptr().addr().is_multiple_of(4)
 }
 
-/// [`super::integer`], if the arguments suit the kernel; else `false` and nothing has been done.
-pub(super) fn integer(width: Width, stream: &[[u8; 4]], inputs: &[u32], finish: Finish, outputs: &mut [u32]) -> bool {
-    let blocks = outputs.len() / finish.words();
-    let whole = outputs.len() == blocks * finish.words() && blocks > 0;
-    let pairs = !inputs.is_empty() && inputs.len().is_multiple_of(2);
-    if !(whole && pairs && aligned(stream) && stream.len() == blocks * width.block(inputs.len())) {
-        return false;
+/// An integer layer that suits the kernels.
+#[derive(Clone, Debug)]
+pub(super) struct Integer<'a> {
+    /// Exactly the blocks that `shape` says, on a word boundary.
+    stream: &'a [[u8; 4]],
+    shape: Shape,
+    width: Width,
+    /// Subtracted from each code in the end.
+    excess: u16,
+}
+
+impl<'a> Integer<'a> {
+    /// A layer of `inputs` words, if it suits the kernels.
+    pub(super) fn new(width: Width, stream: &'a [[u8; 4]], inputs: usize, finish: Finish) -> Option<Self> {
+        let blocks = stream.len() / width.block(inputs);
+        let pairs = inputs > 0 && inputs.is_multiple_of(2);
+        if !(blocks > 0 && pairs && aligned(stream) && stream.len() == blocks * width.block(inputs)) {
+            return None;
+        }
+        let limited = |limit: u16| u32::from(limit.min(i16::MAX as u16));
+        let (offset, subtracted, factor, excess) = match finish {
+            Finish::Codes { limit } => (65_535 - limited(limit), 65_535 - limited(limit), 0, 0),
+            Finish::Linear { limit } => (65_535 - limited(limit), 65_535 - 2 * limited(limit), 0, limited(limit) as u16),
+            Finish::Tanh { limit } => (32_768, 0, 2 * limited(limit), 0),
+            Finish::Sums => (0, 0, 0, 0),
+        };
+        let shape = Shape {
+            inputs: 4 * inputs as u32,
+            outputs: 4 * (blocks * finish.words()) as u32,
+            skipped: ((UNROLLED - inputs / 2 % UNROLLED) % UNROLLED) as u32,
+            offset,
+            offsets: subtracted << 16 | subtracted,
+            factor,
+        };
+        Some(Self { stream, shape, width, excess })
     }
-    let offset = match finish {
-        Finish::Codes { limit } => 65_535 - u32::from(limit.min(i16::MAX as u16)),
-        Finish::Preactivations => 0,
-        Finish::Sums => 1,
-    };
-    let (inputs, outputs) = (inputs.as_ptr_range(), outputs.as_mut_ptr_range());
-    let arguments = Integer {
-        stream: stream.as_ptr(),
-        inputs: inputs.start,
-        inputs_end: inputs.end,
-        outputs: outputs.start,
-        outputs_end: outputs.end,
-        offset,
-        offsets: offset << 16 | offset,
-    };
-    let chunks = (arguments.inputs_end.addr() - arguments.inputs.addr()) / 8;
-    let skipped = (UNROLLED - chunks % UNROLLED) % UNROLLED;
-    // SAFETY: the pointers come from live slices, `stream` is aligned to words, and the three lengths fit together (checked above): the
-    // kernel reads exactly `blocks` blocks of the stream and, for each, all of `inputs` (a whole number of chunks, `skipped` fewer than
-    // a multiple of the unrolled loop's); it writes exactly `outputs`. It keeps the registers that the calling convention protects.
-    unsafe {
-        match width {
-            Width::Int8 => int8(&arguments, skipped),
-            Width::Int16 => int16(&arguments, skipped),
+
+    /// [`super::Integer::run`].
+    #[inline(always)]
+    pub(super) fn run(&self, inputs: &[u32], outputs: &mut [u32]) {
+        let shape = &self.shape;
+        if inputs.len() < shape.inputs as usize / 4 || outputs.len() < shape.outputs as usize / 4 {
+            return;
+        }
+        let (stream, from, to) = (self.stream.as_ptr(), inputs.as_ptr(), outputs.as_mut_ptr());
+        // SAFETY: the pointers come from live slices. `new`, which alone makes a shape, has checked that the stream is aligned to words and
+        // exactly as long as the blocks that belong to `shape.outputs`; for each of them the kernel reads its part of the stream and
+        // `shape.inputs` (a whole number of chunks, `skipped` fewer than a multiple of the unrolled loop's). It writes `shape.outputs`. Both are
+        // inside of the slices (checked above). It keeps the registers that the calling convention protects.
+        unsafe {
+            match self.width {
+                Width::Int8 => int8(shape, stream, from, to),
+                Width::Int16 => int16(shape, stream, from, to),
+            }
+        }
+        if self.excess > 0 {
+            for word in outputs.iter_mut().take(shape.outputs as usize / 4) {
+                *word = super::portable::pair(
+                    (*word as u16).wrapping_sub(self.excess) as i16,
+                    ((*word >> 16) as u16).wrapping_sub(self.excess) as i16,
+                );
+            }
         }
     }
-    true
 }
 
 // Every instruction of the integer kernels is 32 bits wide and so lies on a word: branch targets cost no second fetch, and the loop with
@@ -167,7 +199,60 @@ macro_rules! int16_chunk {
     };
 }
 
-/// A whole integer kernel round a chunk. Arguments: r0 an [`Integer`], r1 chunks to skip in the first pass of the unrolled loop.
+/// tanh of four codes (moved up to 0..65,535) in units of 2⁻³¹: a chord and the way along it.
+macro_rules! four_tanh {
+    ($a:literal, $b:literal, $c:literal, $d:literal) => {
+        concat!(
+            "lsr.w r0, ",
+            $a,
+            ", #8\nlsr.w r1, ",
+            $b,
+            ", #8\nlsr.w r2, ",
+            $c,
+            ", #8\nlsr.w r3, ",
+            $d,
+            ", #8\n",
+            "ldr.w r0, [r5, r0, lsl #2]\nldr.w r1, [r5, r1, lsl #2]\nldr.w r2, [r5, r2, lsl #2]\nldr.w r3, [r5, r3, lsl #2]\n",
+            "lsl.w ",
+            $a,
+            ", ",
+            $a,
+            ", #7\nlsl.w ",
+            $b,
+            ", ",
+            $b,
+            ", #7\nlsl.w ",
+            $c,
+            ", ",
+            $c,
+            ", #7\nlsl.w ",
+            $d,
+            ", ",
+            $d,
+            ", #7\n",
+            "smlabb ",
+            $a,
+            ", r0, ",
+            $a,
+            ", r0\nsmlabb ",
+            $b,
+            ", r1, ",
+            $b,
+            ", r1\n",
+            "smlabb ",
+            $c,
+            ", r2, ",
+            $c,
+            ", r2\nsmlabb ",
+            $d,
+            ", r3, ",
+            $d,
+            ", r3\n",
+        )
+    };
+}
+
+/// A whole integer kernel round a chunk. Arguments: r0 a [`Shape`], r1 the stream, r2 the inputs, r3 the outputs.
 macro_rules! integer_kernel {
     ($chunk:expr) => {
         naked_asm!(
@@ -175,16 +260,20 @@ macro_rules! integer_kernel {
             ".fpu fpv4-sp-d16",
             ".balign 4",
             "push {{r4-r11, lr}}",
-            "adr.w r2, 30f",
-            "ldr.w r1, [r2, r1, lsl #2]",
+            "ldm.w r0, {{r5-r10}}",
+            "mov.w r4, r1",
+            "adr.w r1, 30f",
+            "ldr.w r1, [r1, r7, lsl #2]",
+            "add.w r5, r5, r2",
+            "add.w r6, r6, r3",
+            "vmov s0, r2",
+            "vmov s1, r5",
             "vmov s2, r1",
-            "ldm.w r0, {{r4-r10}}",
-            "vmov s0, r5",
-            "vmov s1, r6",
-            "vmov s3, r7",
-            "vmov s4, r8",
-            "vmov s5, r9",
-            "vmov s6, r10",
+            "vmov s3, r3",
+            "vmov s4, r6",
+            "vmov s5, r8",
+            "vmov s6, r9",
+            "vmov s7, r10",
             // A block: biases, and into the loop.
             "20:",
             "ldm.w r4!, {{r6-r12, lr}}",
@@ -206,9 +295,9 @@ macro_rules! integer_kernel {
             "cmp.w r5, r0",
             "bne.w 10b",
             "vmov r5, s5",
-            "cmp.w r5, #1",
-            "bls.w 40f",
-            // ReLU: with the offset, 16 unsigned bits saturate at the limit; taking it away saturates at 0.
+            "cmp.w r5, #0",
+            "beq.w 41f",
+            // With the offset, 16 unsigned bits saturate at the limit; taking it away saturates at 0.
             "ldm.w r4!, {{r0-r3}}",
             "smmlar r6, r6, r0, r5",
             "smmlar r7, r7, r1, r5",
@@ -229,6 +318,8 @@ macro_rules! integer_kernel {
             "usat r11, #16, r11",
             "usat r12, #16, r12",
             "usat lr, #16, lr",
+            "cmp.w r5, #0",
+            "beq.w 40f",
             "pkhbt r6, r6, r7, lsl #16",
             "pkhbt r7, r8, r9, lsl #16",
             "pkhbt r8, r10, r11, lsl #16",
@@ -247,33 +338,28 @@ macro_rules! integer_kernel {
             ".balign 4",
             "30:",
             ".word 10b + 1, 11b + 1, 12b + 1, 13b + 1, 14b + 1",
-            // Signed codes, then sums.
+            // tanh: the table of chords, then the code of 1.
             "40:",
-            "beq.w 41f",
-            "ldm.w r4!, {{r0-r3}}",
-            "smmulr r6, r6, r0",
-            "smmulr r7, r7, r1",
-            "smmulr r8, r8, r2",
-            "smmulr r9, r9, r3",
-            "ldm.w r4!, {{r0-r3}}",
-            "smmulr r10, r10, r0",
-            "smmulr r11, r11, r1",
-            "smmulr r12, r12, r2",
-            "smmulr lr, lr, r3",
+            "movw r5, #:lower16:{table}",
+            "movt r5, #:upper16:{table}",
+            four_tanh!("r6", "r7", "r8", "r9"),
+            four_tanh!("r10", "r11", "r12", "lr"),
+            "vmov r5, s7",
             "vmov r0, s3",
-            "ssat r6, #16, r6",
-            "ssat r7, #16, r7",
-            "ssat r8, #16, r8",
-            "ssat r9, #16, r9",
-            "ssat r10, #16, r10",
-            "ssat r11, #16, r11",
-            "ssat r12, #16, r12",
-            "ssat lr, #16, lr",
+            "smmulr r6, r6, r5",
+            "smmulr r7, r7, r5",
+            "smmulr r8, r8, r5",
+            "smmulr r9, r9, r5",
+            "smmulr r10, r10, r5",
+            "smmulr r11, r11, r5",
+            "smmulr r12, r12, r5",
+            "smmulr lr, lr, r5",
             "pkhbt r6, r6, r7, lsl #16",
             "pkhbt r7, r8, r9, lsl #16",
             "pkhbt r8, r10, r11, lsl #16",
             "pkhbt r9, r12, lr, lsl #16",
             "b.w 21b",
+            // Sums.
             "41:",
             "vmov r0, s3",
             "vmov r1, s4",
@@ -283,71 +369,89 @@ macro_rules! integer_kernel {
             "vmov s3, r0",
             "bne.w 20b",
             "pop {{r4-r11, pc}}",
+            table = sym crate::network::tanh::TABLE,
         )
     };
 }
 
 /// # Safety
-/// `arguments` must describe live, aligned memory of fitting lengths, and `skipped` must be below [`UNROLLED`].
+/// `stream`, `inputs` and `outputs` must point to live, aligned memory as long as `shape` says, which [`Integer::new`] made.
 #[unsafe(naked)]
-unsafe extern "C" fn int8(arguments: &Integer, skipped: usize) {
+unsafe extern "C" fn int8(shape: &Shape, stream: *const [u8; 4], inputs: *const u32, outputs: *mut u32) {
     integer_kernel!(int8_chunk!())
 }
 
 /// # Safety
 /// As for [`int8`].
 #[unsafe(naked)]
-unsafe extern "C" fn int16(arguments: &Integer, skipped: usize) {
+unsafe extern "C" fn int16(shape: &Shape, stream: *const [u8; 4], inputs: *const u32, outputs: *mut u32) {
     integer_kernel!(int16_chunk!())
 }
 
-/// Arguments of the float kernel, in the order in which it loads them.
+/// A layer's part of the float kernels' arguments, in the order in which they load it.
+#[derive(Clone, Debug)]
 #[repr(C)]
-struct Float {
-    stream: *const [u8; 4],
-    inputs: *const u32,
-    outputs: *mut u32,
-    /// Behind the outputs of the blocks of twelve rows.
-    twelves_end: *const u32,
+struct FloatShape {
+    /// Bytes of the outputs of the blocks of twelve rows.
+    twelves: u32,
     /// Pairs of inputs that are not in whole groups of eight: 0 to 3.
-    pairs: usize,
-    inputs_end: *const u32,
+    pairs: u32,
+    /// Bytes of the inputs.
+    inputs: u32,
     /// 0: ReLU.
     linear: u32,
-    outputs_end: *const u32,
+    /// Bytes of all outputs.
+    outputs: u32,
 }
 
-/// [`super::float`], if the arguments suit the kernel; else `false` and nothing has been done.
-pub(super) fn float(stream: &[[u8; 4]], inputs: &[u32], relu: bool, outputs: &mut [u32]) -> bool {
-    let Some([twelves, _, sixes]) = float_blocks(outputs.len()) else { return false };
-    let pairs = !inputs.is_empty() && inputs.len().is_multiple_of(2);
-    if !(pairs && aligned(stream) && stream.len() == outputs.len() * (1 + inputs.len())) {
-        return false;
+/// A float layer that suits the kernels.
+#[derive(Clone, Debug)]
+pub(super) struct Float<'a> {
+    /// Exactly the blocks that `shape` says, on a word boundary.
+    stream: &'a [[u8; 4]],
+    shape: FloatShape,
+    six: bool,
+}
+
+impl<'a> Float<'a> {
+    /// A layer of so many words, if it suits the kernels.
+    pub(super) fn new(stream: &'a [[u8; 4]], inputs: usize, relu: bool, outputs: usize) -> Option<Self> {
+        let [twelves, _, sixes] = float_blocks(outputs)?;
+        let pairs = inputs > 0 && inputs.is_multiple_of(2);
+        if !(pairs && aligned(stream) && stream.len() == outputs * (1 + inputs)) {
+            return None;
+        }
+        let shape = FloatShape {
+            twelves: 48 * twelves as u32,
+            pairs: (inputs % 8 / 2) as u32,
+            inputs: 4 * inputs as u32,
+            linear: u32::from(!relu),
+            outputs: 4 * outputs as u32,
+        };
+        Some(Self { stream, shape, six: sixes > 0 })
     }
-    let left = inputs.len() % 8 / 2;
-    let (inputs, outputs) = (inputs.as_ptr_range(), outputs.as_mut_ptr_range());
-    let arguments = Float {
-        stream: stream.as_ptr(),
-        inputs: inputs.start,
-        outputs: outputs.start,
-        twelves_end: outputs.start.wrapping_add(twelves * 12),
-        pairs: left,
-        inputs_end: inputs.end,
-        linear: u32::from(!relu),
-        outputs_end: outputs.end,
-    };
-    // SAFETY: the pointers come from live slices, `stream` is aligned to words, and the three lengths fit together (checked above):
-    // `outputs` is exactly one block of six, or `twelves` blocks of twelve and the rest of eight rows, for each of which the kernel reads its part of the stream
-    // and all of `inputs` (`pairs` pairs, then whole groups of eight). It writes exactly `outputs` and keeps the registers that the calling
-    // convention protects.
-    unsafe {
-        if sixes > 0 {
-            float_six_kernel(&arguments);
-        } else {
-            float_kernel(&arguments);
+
+    /// [`super::Float::run`].
+    #[inline(always)]
+    pub(super) fn run(&self, inputs: &[u32], outputs: &mut [u32]) {
+        let shape = &self.shape;
+        if inputs.len() < shape.inputs as usize / 4 || outputs.len() < shape.outputs as usize / 4 {
+            return;
+        }
+        let (stream, from, to) = (self.stream.as_ptr(), inputs.as_ptr(), outputs.as_mut_ptr());
+        // SAFETY: the pointers come from live slices. `new`, which alone makes a shape, has checked that the stream is aligned to words and
+        // that the three lengths fit together: `shape.outputs` are exactly one block of six, or the blocks of twelve and the rest of eight
+        // rows, for each of which the kernel reads its part of the stream and all of `shape.inputs` (`pairs` pairs, then whole groups of
+        // eight). It writes exactly `shape.outputs`. Both are inside of the slices (checked above). It keeps the registers that the calling
+        // convention protects.
+        unsafe {
+            if self.six {
+                float_six_kernel(shape, stream, from, to);
+            } else {
+                float_kernel(shape, stream, from, to);
+            }
         }
     }
-    true
 }
 
 /// Instructions of three operands.
@@ -430,16 +534,23 @@ macro_rules! float_relu {
 }
 
 /// # Safety
-/// `arguments` must describe live, aligned memory of fitting lengths.
+/// `stream`, `inputs` and `outputs` must point to live, aligned memory as long as `shape` says, which [`Float::new`] made.
 #[unsafe(naked)]
-unsafe extern "C" fn float_kernel(arguments: &Float) {
+unsafe extern "C" fn float_kernel(shape: &FloatShape, stream: *const [u8; 4], inputs: *const u32, outputs: *mut u32) {
     naked_asm!(
         ".arch armv7e-m",
         ".fpu fpv4-sp-d16",
         ".balign 4",
         "push {{r4-r11, lr}}",
         "vpush {{s16-s31}}",
-        "ldm.w r0, {{r0-r3, r8-r11}}",
+        // r0 becomes the stream, r1 the inputs, r2 the outputs, r3 the end of the twelves' outputs.
+        "ldm.w r0, {{r7-r11}}",
+        "mov.w r0, r1",
+        "mov.w r1, r2",
+        "mov.w r2, r3",
+        "add.w r3, r3, r7",
+        "add.w r9, r9, r1",
+        "add.w r11, r11, r2",
         "cmp.w r2, r3",
         "beq.w 50f",
         "adr.w r4, 90f",
@@ -546,14 +657,21 @@ unsafe extern "C" fn float_kernel(arguments: &Float) {
 /// # Safety
 /// As for [`float_kernel`].
 #[unsafe(naked)]
-unsafe extern "C" fn float_six_kernel(arguments: &Float) {
+unsafe extern "C" fn float_six_kernel(shape: &FloatShape, stream: *const [u8; 4], inputs: *const u32, outputs: *mut u32) {
     naked_asm!(
         ".arch armv7e-m",
         ".fpu fpv4-sp-d16",
         ".balign 4",
         "push {{r4-r11, lr}}",
         "vpush {{s16-s31}}",
-        "ldm.w r0, {{r0-r3, r8-r11}}",
+        // r0 becomes the stream, r1 the inputs, r2 the outputs, r3 the end of the twelves' outputs.
+        "ldm.w r0, {{r7-r11}}",
+        "mov.w r0, r1",
+        "mov.w r1, r2",
+        "mov.w r2, r3",
+        "add.w r3, r3, r7",
+        "add.w r9, r9, r1",
+        "add.w r11, r11, r2",
         "adr.w r4, 90f",
         "ldr.w lr, [r4, r8, lsl #2]",
         "vldm r0!, {{s0-s5}}",
@@ -597,5 +715,99 @@ unsafe extern "C" fn float_six_kernel(arguments: &Float) {
         ".balign 4",
         "90:",
         ".word 10b + 1, 23b + 1, 22b + 1, 21b + 1",
+    )
+}
+
+/// [`super::tanh`] of whole pairs of words; gives what is left.
+pub(super) fn tanh(words: &mut [u32]) -> &mut [u32] {
+    let (pairs, rest) = words.as_chunks_mut::<2>();
+    let pairs = pairs.as_mut_ptr_range();
+    if !pairs.is_empty() {
+        // SAFETY: the kernel reads and writes exactly the pairs between these pointers, at least one, which come from a live slice. Of
+        // the table it reads what `network::tanh::tanh` reads: the index is at most that of its last entry. It changes none but registers
+        // which a called function may change, apart from those that it saves.
+        unsafe { tanh_kernel(pairs.start.cast(), pairs.end.cast()) };
+    }
+    rest
+}
+
+/// Two arguments at a time, so that one's arithmetic fills the other's stalls: 62 cycles.
+///
+/// # Safety
+/// From `words` to `end` there must be live memory of a positive, even number of words.
+#[unsafe(naked)]
+unsafe extern "C" fn tanh_kernel(words: *mut u32, end: *const u32) {
+    naked_asm!(
+        ".arch armv7e-m",
+        ".fpu fpv4-sp-d16",
+        ".balign 4",
+        "push {{r4-r7}}",
+        // 1.5 × 2²³, 16, 1/16, 9; the table less sixteen times the bits of the first.
+        "movw r2, #0",
+        "movt r2, #0x4b40",
+        "vmov s12, r2",
+        "vmov.f32 s13, #16.0",
+        "mov.w r3, #0x3d800000",
+        "vmov s14, r3",
+        "movw r6, #0",
+        "movt r6, #0x4110",
+        "movw r7, #:lower16:{table}",
+        "movt r7, #:upper16:{table}",
+        "sub.w r7, r7, #0xb4000000",
+        ".balign 4",
+        "10:",
+        "ldr.w r2, [r0]",
+        "ldr.w r3, [r0, #4]",
+        "bic r4, r2, #0x80000000",
+        "bic r5, r3, #0x80000000",
+        "cmp r4, r6",
+        "it hi",
+        "movhi r4, r6",
+        "vmov s0, r4",
+        "cmp r5, r6",
+        "it hi",
+        "movhi r5, r6",
+        "vmov s1, r5",
+        "vmul.f32 s2, s0, s13",
+        "vmul.f32 s3, s1, s13",
+        "vadd.f32 s2, s2, s12",
+        "vadd.f32 s3, s3, s12",
+        "vmov r4, s2",
+        "vmov r5, s3",
+        "vsub.f32 s2, s2, s12",
+        "vsub.f32 s3, s3, s12",
+        "add.w r4, r7, r4, lsl #4",
+        "vmul.f32 s2, s2, s14",
+        "vmul.f32 s3, s3, s14",
+        "add.w r5, r7, r5, lsl #4",
+        "vldm r4, {{s4-s7}}",
+        "vsub.f32 s0, s0, s2",
+        "vsub.f32 s1, s1, s3",
+        "vldm r5, {{s8-s11}}",
+        "vmul.f32 s7, s7, s0",
+        "vmul.f32 s11, s11, s1",
+        "vadd.f32 s6, s6, s7",
+        "vadd.f32 s10, s10, s11",
+        "vmul.f32 s6, s6, s0",
+        "vmul.f32 s10, s10, s1",
+        "vadd.f32 s5, s5, s6",
+        "vadd.f32 s9, s9, s10",
+        "vmul.f32 s5, s5, s0",
+        "vmul.f32 s9, s9, s1",
+        "vadd.f32 s4, s4, s5",
+        "vadd.f32 s8, s8, s9",
+        "and r2, r2, #0x80000000",
+        "and r3, r3, #0x80000000",
+        "vmov r4, s4",
+        "vmov r5, s8",
+        "orr.w r4, r4, r2",
+        "orr.w r5, r5, r3",
+        "str.w r4, [r0], #4",
+        "str.w r5, [r0], #4",
+        "cmp r0, r1",
+        "bne 10b",
+        "pop {{r4-r7}}",
+        "bx lr",
+        table = sym crate::network::tanh::CUBIC,
     )
 }

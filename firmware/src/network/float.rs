@@ -1,7 +1,7 @@
 //! Dense layers in f32.
 
-use super::{Activation, ROWS, kernel, tanh::tanh};
-use crate::model::{Blob, LayerLayout, MAX_OUTPUTS, Refusal, Section, Words};
+use super::{Activation, ROWS, kernel};
+use crate::model::{Blob, LayerLayout, Refusal, Section};
 
 /// Inputs are padded to a multiple of this.
 const PADDING: usize = 2;
@@ -9,10 +9,9 @@ const PADDING: usize = 2;
 /// One checked layer.
 #[derive(Debug)]
 pub(super) struct Layer<'a> {
-    stream: Words<'a>,
-    inputs: u16,
+    kernel: kernel::Float<'a>,
     outputs: u16,
-    activation: Activation,
+    tanh: bool,
 }
 
 impl<'a> Layer<'a> {
@@ -35,47 +34,40 @@ impl<'a> Layer<'a> {
     ) -> Result<Self, Refusal> {
         let (inputs, outputs) = (inputs.next_multiple_of(PADDING), kernel::float_rows(outputs));
         blob.floats(section, outputs * (1 + inputs), what)?;
-        let stream = blob.words(section, outputs * (1 + inputs), what)?;
-        Ok(Self { stream, inputs: inputs as u16, outputs: outputs as u16, activation })
+        let stream = blob.words(section, outputs * (1 + inputs), what)?.all();
+        let kernel = kernel::Float::new(stream, inputs as u16, activation == Activation::Relu, outputs as u16);
+        Ok(Self { kernel, outputs: outputs as u16, tanh: activation == Activation::Tanh })
     }
 
     #[inline(always)]
-    fn hidden(&self, inputs: &[u32], outputs: &mut [u32]) {
-        let (Some(inputs), Some(outputs)) = (inputs.get(..self.inputs.into()), outputs.get_mut(..self.outputs.into())) else {
-            return;
-        };
-        kernel::float(self.stream.all(), inputs, self.activation == Activation::Relu, outputs);
-        if self.activation == Activation::Tanh {
-            Self::activate(outputs);
+    fn run(&self, inputs: &[u32], outputs: &mut [u32]) {
+        self.kernel.run(inputs, outputs);
+        if self.tanh
+            && let Some(outputs) = outputs.get_mut(..self.outputs.into())
+        {
+            kernel::tanh(outputs);
         }
     }
 
-    /// Tanh, two at a time, so that one's arithmetic fills the other's stalls; the rows are even in number.
+    /// Writes the outputs of the skip.
     #[inline(never)]
-    fn activate(words: &mut [u32]) {
-        for pair in words.as_chunks_mut::<2>().0 {
-            *pair = pair.map(|word| tanh(f32::from_bits(word)).to_bits());
-        }
-    }
-
-    /// Adds the outputs of the last layer, or of the skip.
-    #[inline(never)]
-    pub(super) fn outputs(&self, inputs: &[u32], result: &mut [f32; MAX_OUTPUTS]) {
+    pub(super) fn outputs(&self, inputs: &[u32], result: &mut [f32]) {
         let mut outputs = [0; ROWS];
-        if let (Some(inputs), Some(outputs)) = (inputs.get(..self.inputs.into()), outputs.get_mut(..self.outputs.into())) {
-            kernel::float(self.stream.all(), inputs, false, outputs);
-        }
+        self.run(inputs, &mut outputs);
         for (result, output) in result.iter_mut().zip(outputs) {
-            *result += f32::from_bits(output);
+            *result = f32::from_bits(output);
         }
     }
 }
 
-/// Runs the hidden layers on the inputs in `current`; gives the last one's outputs.
-#[inline(never)]
-pub(super) fn hidden<'s>(layers: &[Layer<'_>], mut current: &'s mut [u32], mut other: &'s mut [u32]) -> &'s [u32] {
+/// Runs all layers on the inputs in `current`; gives the last one's outputs.
+#[inline(always)]
+pub(super) fn outputs<'s>(layers: &[Layer<'_>], mut current: &'s mut [u32], mut other: &'s mut [u32]) -> &'s [u32] {
+    if layers.is_empty() {
+        current.fill(0);
+    }
     for layer in layers {
-        layer.hidden(current, other);
+        layer.run(current, other);
         core::mem::swap(&mut current, &mut other);
     }
     current

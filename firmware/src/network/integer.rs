@@ -8,25 +8,18 @@ use super::{
     Activation, INPUT_PADDING, ROWS,
     kernel::{self, Finish, Width, portable},
     padded,
-    tanh::{code_factor, scaled_tanh},
 };
-use crate::model::{Blob, LayerLayout, MAX_OUTPUTS, Refusal, Words};
+use crate::model::{Blob, Floats, LayerLayout, Refusal};
 
 /// One checked layer.
 #[derive(Debug)]
 pub(super) struct Layer<'a> {
+    kernel: kernel::Integer<'a>,
     width: Width,
-    stream: Words<'a>,
     /// Words of a row's inputs.
     inputs: u16,
-    /// Words of its outputs, as codes, and how many of them the next layer reads.
-    outputs: u16,
-    read: u16,
-    activation: Activation,
-    /// Largest code of its inputs and of its outputs.
-    limits: [u16; 2],
-    /// For tanh.
-    factor: i32,
+    /// Largest code of its inputs.
+    limit: u16,
 }
 
 /// Biases, weights and requantisation of eight rows.
@@ -46,19 +39,17 @@ impl<'a> Layer<'a> {
         if limit == 0 || limit > i16::MAX as u16 {
             return Err(Refusal::Value { what: "largest input code" });
         }
-        let next_limit = next.map_or(0, |next| next.input_limit);
-        let inputs = usize::from(layout.inputs).next_multiple_of(INPUT_PADDING) / 2;
-        let rows = padded(layout.outputs.into());
-        let layer = Self {
-            width,
-            stream: blob.words(layout.rows, rows / ROWS * width.block(inputs), "layer rows")?,
-            inputs: inputs as u16,
-            outputs: (rows / 2) as u16,
-            read: (usize::from(layout.outputs).next_multiple_of(INPUT_PADDING) / 2) as u16,
-            activation: layout.activation,
-            limits: [limit, next_limit],
-            factor: code_factor(next_limit),
+        let finish = match (next.map(|next| next.input_limit), layout.activation) {
+            (None, _) => Finish::Sums,
+            (Some(limit), Activation::Relu) => Finish::Codes { limit },
+            (Some(limit), Activation::Tanh) => Finish::Tanh { limit },
+            (Some(limit), Activation::Linear) => Finish::Linear { limit },
         };
+        let inputs = usize::from(layout.inputs).next_multiple_of(INPUT_PADDING) / 2;
+        let blocks = padded(layout.outputs.into()) / ROWS;
+        let stream = blob.words(layout.rows, blocks * width.block(inputs), "layer rows")?.all();
+        let kernel = kernel::Integer::new(width, stream, inputs, finish);
+        let layer = Self { kernel, width, inputs: inputs as u16, limit };
         layer.refuse_overflow(index, before)?;
         if next.is_none()
             && !layer.blocks().all(|(_, _, scales)| scales.iter().all(|scale| f32::from_le_bytes(*scale).is_finite()))
@@ -69,7 +60,7 @@ impl<'a> Layer<'a> {
     }
 
     fn blocks(&self) -> impl Iterator<Item = Block<'a>> + use<'a> {
-        self.stream.chunks(self.width.block(self.inputs.into())).filter_map(|block| {
+        self.kernel.stream().chunks_exact(self.width.block(self.inputs.into())).filter_map(|block| {
             let (bias, rest) = block.split_first_chunk()?;
             let (weights, requantisation) = rest.split_last_chunk()?;
             Some((bias, weights, requantisation))
@@ -78,7 +69,7 @@ impl<'a> Layer<'a> {
 
     /// No accumulator may leave 32 bits for any codes.
     fn refuse_overflow(&self, index: u8, before: Activation) -> Result<(), Refusal> {
-        let limit = i64::from(self.limits[0]);
+        let limit = i64::from(self.limit);
         for (bias, weights, _) in self.blocks() {
             let bias = bias.map(|bias| i64::from(i32::from_le_bytes(bias)));
             // Sums of the positive and of the negative weights.
@@ -112,62 +103,6 @@ impl<'a> Layer<'a> {
         }
         Ok(())
     }
-
-    #[inline(always)]
-    fn hidden(&self, codes: &[u32], outputs: &mut [u32]) {
-        let limit = self.limits[1];
-        let (Some(codes), Some(outputs)) = (codes.get(..self.inputs.into()), outputs.get_mut(..self.outputs.into())) else {
-            return;
-        };
-        let finish = match self.activation {
-            Activation::Relu => Finish::Codes { limit },
-            Activation::Tanh | Activation::Linear => Finish::Preactivations,
-        };
-        kernel::integer(self.width, self.stream.all(), codes, finish, outputs);
-        if finish == Finish::Preactivations {
-            self.activate(outputs);
-        }
-    }
-
-    /// Pre-activations to codes; a function of its own, to keep the way of ReLU short.
-    #[inline(never)]
-    fn activate(&self, words: &mut [u32]) {
-        let words = words.get_mut(..self.read.into()).unwrap_or_default();
-        if self.activation == Activation::Tanh {
-            let factor = self.factor;
-            each_code(words, |code| scaled_tanh(code as u16, factor));
-        } else {
-            let limit = self.limits[1] as i16;
-            each_code(words, |code| {
-                if code > limit {
-                    limit
-                } else if code < -limit {
-                    -limit
-                } else {
-                    code
-                }
-            });
-        }
-    }
-
-    /// Adds the last layer's outputs to `result`; the accumulators go through `sums`, which saves stack.
-    #[inline(never)]
-    pub(super) fn last(&self, codes: &[u32], sums: &mut [u32], result: &mut [f32; MAX_OUTPUTS]) {
-        let (Some(codes), Some(sums)) = (codes.get(..self.inputs.into()), sums.first_chunk_mut::<ROWS>()) else { return };
-        kernel::integer(self.width, self.stream.all(), codes, Finish::Sums, sums);
-        let Some(scales) = self.stream.all().last_chunk::<ROWS>() else { return };
-        for ((value, sum), scale) in result.iter_mut().zip(sums).zip(scales) {
-            *value += *sum as i32 as f32 * f32::from_le_bytes(*scale);
-        }
-    }
-}
-
-#[inline(always)]
-fn each_code(words: &mut [u32], map: impl Fn(i16) -> i16) {
-    for word in words {
-        let [low, high] = portable::halves(*word);
-        *word = portable::pair(map(low), map(high));
-    }
 }
 
 /// 1.5 × 2²³: in the f32 above it the last bit is worth 1.
@@ -180,22 +115,47 @@ fn code(value: f32, limit: i32) -> i16 {
     integer.clamp(-limit, limit) as i16
 }
 
-/// Makes codes of `count` normalised inputs (f32, padded with zeros): `factor` is the code of 1.
-#[inline(never)]
-pub(super) fn encode(normalised: &[u32], count: usize, factor: f32, layers: &[Layer<'_>], codes: &mut [u32]) {
-    let limit = layers.first().map_or(0, |layer| i32::from(layer.limits[0]));
-    let pairs = normalised.get(..count.next_multiple_of(INPUT_PADDING)).unwrap_or_default().as_chunks::<2>().0;
+/// What an input is normalised with, and the code of 1.
+pub(super) struct Encoding<'a> {
+    pub(super) mean: Floats<'a>,
+    pub(super) reciprocal_scale: Floats<'a>,
+    pub(super) code: f32,
+}
+
+/// Normalises the inputs into `normalised`, which is padded with zeros, and makes `codes` of them, likewise.
+#[inline(always)]
+pub(super) fn encode(encoding: &Encoding<'_>, inputs: &[f32], layers: &[Layer<'_>], normalised: &mut [u32], codes: &mut [u32]) {
+    let limit = layers.first().map_or(0, |layer| i32::from(layer.limit));
+    let normalisation = encoding.mean.iter().zip(encoding.reciprocal_scale.iter());
+    for ((place, input), (mean, reciprocal)) in normalised.iter_mut().zip(inputs).zip(normalisation) {
+        *place = ((*input - mean) * reciprocal).to_bits();
+    }
+    let mut padded = inputs.len();
+    while !padded.is_multiple_of(INPUT_PADDING) {
+        if let Some(place) = normalised.get_mut(padded) {
+            *place = 0;
+        }
+        padded += 1;
+    }
+    let pairs = normalised.as_chunks::<2>().0.iter().take(padded / 2);
     for (word, [low, high]) in codes.iter_mut().zip(pairs) {
-        *word = portable::pair(code(f32::from_bits(*low) * factor, limit), code(f32::from_bits(*high) * factor, limit));
+        let [low, high] = [*low, *high].map(|value| code(f32::from_bits(value) * encoding.code, limit));
+        *word = portable::pair(low, high);
     }
 }
 
-/// Runs the hidden layers on the input codes in `current`; gives the last one's codes, and the other half of the memory.
-#[inline(never)]
-pub(super) fn hidden<'s>(layers: &[Layer<'_>], mut current: &'s mut [u32], mut other: &'s mut [u32]) -> [&'s mut [u32]; 2] {
+/// Runs all layers on the codes in `current`; gives the last one's accumulators.
+#[inline(always)]
+pub(super) fn sums<'s>(layers: &[Layer<'_>], mut current: &'s mut [u32], mut other: &'s mut [u32]) -> &'s [u32] {
     for layer in layers {
-        layer.hidden(current, other);
+        layer.kernel.run(current, other);
         core::mem::swap(&mut current, &mut other);
     }
-    [current, other]
+    current
+}
+
+/// Scales of the last layer's rows.
+#[inline(always)]
+pub(super) fn scales<'a>(layers: &[Layer<'a>]) -> &'a [[u8; 4]; ROWS] {
+    layers.last().and_then(|layer| layer.kernel.stream().last_chunk()).unwrap_or(&[[0; 4]; ROWS])
 }

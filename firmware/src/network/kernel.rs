@@ -70,8 +70,16 @@ pub enum Finish {
         /// Largest code, at most 32,767.
         limit: u16,
     },
-    /// ⌊a m / 2³² + ½⌋ within −32,768..=32,767, two to a word.
-    Preactivations,
+    /// tanh: ⌊a m / 2³² + ½⌋ within −32,768..=32,767, and of it [`tanh_code`](super::tanh_code), two to a word.
+    Tanh {
+        /// Code of 1, at most 32,767.
+        limit: u16,
+    },
+    /// The identity: ⌊a m / 2³² + ½⌋ within ±limit, two to a word.
+    Linear {
+        /// Largest code, at most 32,767.
+        limit: u16,
+    },
     /// The accumulator itself, one to a word.
     Sums,
 }
@@ -80,7 +88,7 @@ impl Finish {
     /// Words of outputs for each block.
     pub const fn words(self) -> usize {
         match self {
-            Self::Codes { .. } | Self::Preactivations => ROWS / 2,
+            Self::Codes { .. } | Self::Tanh { .. } | Self::Linear { .. } => ROWS / 2,
             Self::Sums => ROWS,
         }
     }
@@ -89,15 +97,53 @@ impl Finish {
 /// Which kernel [`integer`] and [`float`] run on an aligned stream.
 pub const NAME: &str = if cfg!(cortex_m4) { "Cortex-M4 assembly" } else { "portable" };
 
-/// Runs an integer layer. `inputs` are pairs of codes (an even number of words), `outputs` as many words as there are blocks in
-/// `stream` times [`Finish::words`]; what has no counterpart is left as it is.
-#[inline]
-pub fn integer(width: Width, stream: &[[u8; 4]], inputs: &[u32], finish: Finish, outputs: &mut [u32]) {
+/// An integer layer, checked once: an evaluation then checks two lengths alone.
+#[derive(Clone, Debug)]
+pub struct Integer<'a> {
+    stream: &'a [[u8; 4]],
+    width: Width,
+    finish: Finish,
+    inputs: usize,
+    outputs: usize,
     #[cfg(cortex_m4)]
-    if cortex_m4::integer(width, stream, inputs, finish, outputs) {
-        return;
+    assembly: Option<cortex_m4::Integer<'a>>,
+}
+
+impl<'a> Integer<'a> {
+    /// A layer of `inputs` words (an even number) and the blocks in `stream`.
+    pub fn new(width: Width, stream: &'a [[u8; 4]], inputs: usize, finish: Finish) -> Self {
+        let outputs = stream.len() / width.block(inputs) * finish.words();
+        #[cfg(cortex_m4)]
+        let assembly = cortex_m4::Integer::new(width, stream, inputs, finish);
+        Self {
+            stream,
+            width,
+            finish,
+            inputs,
+            outputs,
+            #[cfg(cortex_m4)]
+            assembly,
+        }
     }
-    portable::integer(width, stream, inputs, finish, outputs);
+
+    /// Words of each input and weights of the layer.
+    pub(super) fn stream(&self) -> &'a [[u8; 4]] {
+        self.stream
+    }
+
+    /// Reads the first words of `inputs`, which are pairs of codes, and writes the first ones of `outputs`, [`Finish::words`] for each
+    /// block; does nothing if either are too few.
+    #[inline(always)]
+    pub fn run(&self, inputs: &[u32], outputs: &mut [u32]) {
+        #[cfg(cortex_m4)]
+        if let Some(assembly) = &self.assembly {
+            assembly.run(inputs, outputs);
+            return;
+        }
+        if let (Some(inputs), Some(outputs)) = (inputs.get(..self.inputs), outputs.get_mut(..self.outputs)) {
+            portable::integer(self.width, self.stream, inputs, self.finish, outputs);
+        }
+    }
 }
 
 /// Rows of a float layer of so many outputs.
@@ -121,12 +167,50 @@ pub const fn float_blocks(rows: usize) -> Option<[usize; 3]> {
     Some([(rows - 8 * eights) / 12, eights, 0])
 }
 
-/// Runs a float layer. `inputs` are the bits of an even number of f32, `outputs` those of all the rows in `stream`.
-#[inline]
-pub fn float(stream: &[[u8; 4]], inputs: &[u32], relu: bool, outputs: &mut [u32]) {
+/// A float layer, checked once.
+#[derive(Clone, Debug)]
+pub struct Float<'a> {
+    stream: &'a [[u8; 4]],
+    relu: bool,
+    inputs: u16,
+    outputs: u16,
     #[cfg(cortex_m4)]
-    if cortex_m4::float(stream, inputs, relu, outputs) {
-        return;
+    assembly: Option<cortex_m4::Float<'a>>,
+}
+
+impl<'a> Float<'a> {
+    /// A layer of `inputs` words (an even number) and `outputs` rows, those of [`float_rows`].
+    pub fn new(stream: &'a [[u8; 4]], inputs: u16, relu: bool, outputs: u16) -> Self {
+        #[cfg(cortex_m4)]
+        let assembly = cortex_m4::Float::new(stream, inputs.into(), relu, outputs.into());
+        Self {
+            stream,
+            relu,
+            inputs,
+            outputs,
+            #[cfg(cortex_m4)]
+            assembly,
+        }
     }
-    portable::float(stream, inputs, relu, outputs);
+
+    /// Reads the bits of f32 in the first words of `inputs` and writes the first ones of `outputs`; does nothing if either are too few.
+    #[inline(always)]
+    pub fn run(&self, inputs: &[u32], outputs: &mut [u32]) {
+        #[cfg(cortex_m4)]
+        if let Some(assembly) = &self.assembly {
+            assembly.run(inputs, outputs);
+            return;
+        }
+        if let (Some(inputs), Some(outputs)) = (inputs.get(..self.inputs.into()), outputs.get_mut(..self.outputs.into())) {
+            portable::float(self.stream, inputs, self.relu, outputs);
+        }
+    }
+}
+
+/// The [`tanh`](super::tanh()) of each f32.
+#[inline]
+pub fn tanh(words: &mut [u32]) {
+    #[cfg(cortex_m4)]
+    let words = cortex_m4::tanh(words);
+    portable::tanh(words);
 }

@@ -117,58 +117,57 @@ impl<'a> Network<'a> {
         self.run(inputs, outputs, scratch.words());
     }
 
-    // Its parts are functions of their own so that their stacks are not added up.
     #[inline(never)]
     fn run(&self, inputs: &[f32], outputs: &mut [f32], scratch: &mut [u32]) {
         let (Some((front, rest)), Some(inputs)) = (scratch.split_at_mut_checked(self.half), inputs.get(..self.mean.len())) else {
             return;
         };
         let Some(back) = rest.get_mut(..self.half) else { return };
-        let mut result = [0.0; MAX_OUTPUTS];
         match &self.layers {
             Layers::Float(layers) => {
                 self.normalise(inputs, front);
-                self.skip(front, &mut result);
-                if let Some((last, layers)) = layers.split_last() {
-                    last.outputs(float::hidden(layers, front, back), &mut result);
-                }
+                self.skip(front, outputs);
+                let values = float::outputs(layers, front, back);
+                self.denormalise(values.iter().map(|value| f32::from_bits(*value)), outputs);
             }
             Layers::Integer { code, layers } => {
-                self.normalise(inputs, back);
-                integer::encode(back, inputs.len(), *code, layers, front);
-                self.skip(back, &mut result);
-                if let Some((last, layers)) = layers.split_last() {
-                    let [codes, sums] = integer::hidden(layers, front, back);
-                    last.last(codes, sums, &mut result);
-                }
+                let encoding = integer::Encoding { mean: self.mean, reciprocal_scale: self.reciprocal_scale, code: *code };
+                integer::encode(&encoding, inputs, layers, back, front);
+                self.skip(back, outputs);
+                let sums = integer::sums(layers, front, back).iter().zip(integer::scales(layers));
+                self.denormalise(sums.map(|(sum, scale)| *sum as i32 as f32 * f32::from_le_bytes(*scale)), outputs);
             }
         }
-        self.denormalise(&result, outputs);
     }
 
     /// Normalises the inputs into `words`, padded with zeros.
-    #[inline(never)]
+    #[inline(always)]
     fn normalise(&self, inputs: &[f32], words: &mut [u32]) {
         let normalisation = self.mean.iter().zip(self.reciprocal_scale.iter());
         for ((word, input), (mean, reciprocal)) in words.iter_mut().zip(inputs).zip(normalisation) {
             *word = ((*input - mean) * reciprocal).to_bits();
         }
-        let padding = words.iter_mut().skip(inputs.len());
-        padding.take(inputs.len().wrapping_neg() % INPUT_PADDING).for_each(|word| *word = 0);
-    }
-
-    #[inline(never)]
-    fn skip(&self, normalised: &[u32], result: &mut [f32; MAX_OUTPUTS]) {
-        if let Some(skip) = &self.skip {
-            skip.outputs(normalised, result);
+        // One is enough: float layers have an even number of inputs.
+        if let Some(word) = words.get_mut(inputs.len()) {
+            *word = 0;
         }
     }
 
-    #[inline(never)]
-    fn denormalise(&self, result: &[f32; MAX_OUTPUTS], outputs: &mut [f32]) {
+    /// Writes the skip's outputs, if there is one.
+    #[inline(always)]
+    fn skip(&self, normalised: &[u32], outputs: &mut [f32]) {
+        if let Some(skip) = &self.skip {
+            skip.outputs(normalised, outputs);
+        }
+    }
+
+    /// Adds the dense layers' outputs to the skip's, and makes physical units of them.
+    #[inline(always)]
+    fn denormalise(&self, values: impl Iterator<Item = f32>, outputs: &mut [f32]) {
         let denormalisation = self.output_scale.iter().zip(self.output_mean.iter());
-        for ((output, value), (scale, mean)) in outputs.iter_mut().zip(result).zip(denormalisation) {
-            *output = value * scale + mean;
+        for ((output, value), (scale, mean)) in outputs.iter_mut().zip(values).zip(denormalisation) {
+            let skip = if self.skip.is_some() { *output } else { 0.0 };
+            *output = (skip + value) * scale + mean;
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The kernels in safe Rust, for every machine: the definition of the bits that the assembly must give.
 
 use super::{Finish, Width, float_blocks};
-use crate::network::ROWS;
+use crate::network::{self, ROWS, tanh_code};
 
 /// Upper bits of accumulator × multiplier + 2³¹.
 #[inline(always)]
@@ -28,7 +28,7 @@ pub const fn pair(low: i16, high: i16) -> u32 {
     low as u16 as u32 | (high as u16 as u32) << 16
 }
 
-/// [`super::integer`] on any machine.
+/// A layer of [`super::Integer`] on any machine: `outputs` are all that it has.
 #[inline(never)]
 pub fn integer(width: Width, stream: &[[u8; 4]], inputs: &[u32], finish: Finish, outputs: &mut [u32]) {
     let blocks = stream.chunks_exact(width.block(inputs.len()));
@@ -59,8 +59,12 @@ pub fn integer(width: Width, stream: &[[u8; 4]], inputs: &[u32], finish: Finish,
                 let code = |row| code(row).clamp(0, i32::from(limit)) as i16;
                 outputs.iter_mut().enumerate().for_each(|(i, word)| *word = pair(code(2 * i), code(2 * i + 1)));
             }
-            Finish::Preactivations => {
-                let code = |row| code(row).clamp(i32::from(i16::MIN), i32::from(i16::MAX)) as i16;
+            Finish::Tanh { limit } => {
+                let code = |row| tanh_code(code(row).clamp(i32::from(i16::MIN), i32::from(i16::MAX)) as i16, limit);
+                outputs.iter_mut().enumerate().for_each(|(i, word)| *word = pair(code(2 * i), code(2 * i + 1)));
+            }
+            Finish::Linear { limit } => {
+                let code = |row| code(row).clamp(-i32::from(limit), i32::from(limit)) as i16;
                 outputs.iter_mut().enumerate().for_each(|(i, word)| *word = pair(code(2 * i), code(2 * i + 1)));
             }
             Finish::Sums => outputs.iter_mut().zip(sums).for_each(|(word, sum)| *word = sum as u32),
@@ -77,7 +81,7 @@ fn multiply_add(weights: [i16; 2], input: u32, sum: i32) -> i32 {
     sum.wrapping_add(low).wrapping_add(high)
 }
 
-/// [`super::float`] on any machine.
+/// A layer of [`super::Float`] on any machine: `inputs` and `outputs` are all that it has.
 #[inline(never)]
 pub fn float(stream: &[[u8; 4]], inputs: &[u32], relu: bool, outputs: &mut [u32]) {
     let Some([twelves, _, sixes]) = float_blocks(outputs.len()) else { return };
@@ -110,4 +114,12 @@ fn float_part<const N: usize>(stream: &[[u8; 4]], inputs: &[u32], relu: bool, ou
 #[inline(always)]
 const fn rectified(bits: u32) -> u32 {
     bits & !((bits as i32 >> 31) as u32)
+}
+
+/// [`super::tanh`] on any machine.
+#[inline(always)]
+pub fn tanh(words: &mut [u32]) {
+    for word in words {
+        *word = network::tanh(f32::from_bits(*word)).to_bits();
+    }
 }

@@ -2,69 +2,73 @@
 //!
 //! Both use integer arithmetic, or + - and × of f32 alone: the same bits on every machine, the same instructions for every argument.
 
-/// Code of a pre-activation of 1: the input's range is ±8.
-pub const TANH_INPUT_ONE: i32 = 4096;
+/// Code of a pre-activation of 1: the input's range is ±5⅓.
+pub const TANH_INPUT_ONE: i32 = 6144;
 
-/// Largest difference of [`tanh_code`] from the exact function, apart from the rounding to the output code: 512 chords over -8..8
-/// cost h²/8 · max|tanh''| = 9.4e-5 (h = 1/32), the table's own rounding and the end of the range (1 - tanh 8 = 2.3e-7) little.
+/// Largest difference of [`tanh_code`] from the exact function, apart from the rounding to the output code: 256 chords, each moved to
+/// the middle between the curve's extremes, cost h²/16 · max|tanh''| = 8.4e-5 (h = 1/24), the table's own rounding and the end of the
+/// range (1 - tanh 5⅓ = 4.7e-5) less.
 pub const TANH_CODE_ERROR: f64 = 1.15e-4;
 
-/// Chords over -8..8.
-const CHORDS: usize = 512;
+/// Chords over the range.
+const CHORDS: usize = 256;
 /// Input codes in a chord, as a shift.
-const CHORD_SHIFT: u32 = 7;
+const CHORD_SHIFT: u32 = 8;
 /// Steps of 1 in the table.
-const TABLE_ONE: f64 = 32_767.0;
+const TABLE_ONE: f64 = 32_768.0;
 
-/// For each chord its start in units of 1/32767, times 2¹⁵, plus its rise in the same units (at most 1024). So one load fetches both; as
-/// the chord's start, the rise in the low bits adds less than 1/32 of a unit.
-static TABLE: [i32; CHORDS] = table();
+/// One kibibyte, on a boundary of a flash line.
+#[derive(Debug)]
+#[repr(align(16))]
+pub(super) struct Table([i32; CHORDS]);
 
-const fn table() -> [i32; CHORDS] {
-    // exp(-1/16) by its series, then tanh(x) = (1 - exp(-2x)) / (1 + exp(-2x)) in steps of x = 1/32.
+/// For each chord in the upper half of a word its start (even chords) or its end (odd ones) in units of 1/32768, in the lower half its
+/// rise in half units (at most 2731): as part of the other number that is less than 1/20 of a unit. An argument's lowest nine bits,
+/// signed, are the way from that point, so that no bit has to be masked.
+pub(super) static TABLE: Table = table();
+
+const fn nearest(value: f64) -> i32 {
+    (value + if value < 0.0 { -0.5 } else { 0.5 }) as i32
+}
+
+const fn table() -> Table {
+    // exp(-1/24) by its series, then tanh(x) = (1 - exp(-2x)) / (1 + exp(-2x)) in steps of x = 1/48: ends and middles of chords.
     let (mut ratio, mut term, mut n) = (1.0f64, 1.0f64, 1);
     while n < 20 {
-        term *= -0.0625 / n as f64;
+        term *= -1.0 / 24.0 / n as f64;
         ratio += term;
         n += 1;
     }
-    let mut points = [0i32; CHORDS / 2 + 1];
+    let mut points = [0.0; CHORDS + 1];
     let (mut power, mut i) = (1.0f64, 0);
-    while i <= CHORDS / 2 {
-        points[i] = ((1.0 - power) / (1.0 + power) * TABLE_ONE + 0.5) as i32;
+    while i <= CHORDS {
+        points[i] = (1.0 - power) / (1.0 + power) * TABLE_ONE;
         power *= ratio;
         i += 1;
     }
     let (mut table, mut i) = ([0i32; CHORDS], 0);
     while i < CHORDS / 2 {
-        let rise = points[i + 1] - points[i];
-        table[CHORDS / 2 + i] = (points[i] << 15) + rise;
-        table[CHORDS / 2 - 1 - i] = (-points[i + 1] << 15) + rise;
+        let [start, middle, end] = [points[2 * i], points[2 * i + 1], points[2 * i + 2]];
+        let shift = (middle - (start + end) / 2.0) / 2.0;
+        let rise = nearest(2.0 * (end - start));
+        let (above, below) = (CHORDS / 2 + i, CHORDS / 2 - 1 - i);
+        table[above] = (nearest(if above % 2 == 0 { start } else { end } + shift) << 16) + rise;
+        table[below] = (-nearest(if below % 2 == 0 { end } else { start } + shift) << 16) + rise;
         i += 1;
     }
-    table
+    Table(table)
 }
 
-/// Factor from 2¹⁵ table steps to output codes of which `limit` is 1, times 2³².
-#[inline]
-pub(super) const fn code_factor(limit: u16) -> i32 {
-    ((((limit as u64) << 17) + 16_383) / 32_767) as i32
-}
-
-/// tanh of a pre-activation code (units of 1/[`TANH_INPUT_ONE`]) as a code of which `limit` is 1.
+/// tanh of a pre-activation code (units of 1/[`TANH_INPUT_ONE`]) as a code of which `limit` (at most 32,767) is 1.
 #[inline]
 pub fn tanh_code(code: i16, limit: u16) -> i16 {
-    scaled_tanh(code as u16, code_factor(limit))
-}
-
-/// The same for the bits of a code and a known factor.
-#[inline(always)]
-pub(super) fn scaled_tanh(code: u16, factor: i32) -> i16 {
-    let places = u32::from(code ^ 0x8000);
+    let place = code as u16 ^ 0x8000;
     // The sixteen bits of a code never reach beyond the table.
-    let Some(&chord) = TABLE.get((places >> CHORD_SHIFT) as usize) else { return 0 };
-    let fraction = ((places & ((1 << CHORD_SHIFT) - 1)) << (15 - CHORD_SHIFT)) as i32;
-    super::kernel::portable::requantise(chord + (chord & 0x7fff) * fraction, factor) as i16
+    let Some(&chord) = TABLE.0.get(usize::from(place >> CHORD_SHIFT)) else { return 0 };
+    let way = (place << (15 - CHORD_SHIFT)) as i16;
+    let value = chord.wrapping_add(i32::from(chord as i16) * i32::from(way));
+    // In units of 2⁻³¹.
+    super::kernel::portable::requantise(value, 2 * i32::from(limit)) as i16
 }
 
 /// Largest difference of [`tanh`] from the exact function: 2e-8 of the cubics, the rest the rounding of f32 (an ulp below 1 is 6e-8).
@@ -77,9 +81,10 @@ const SATURATED: f32 = 9.0;
 
 /// Coefficients of 1, d, d², d³ around i / 16, on a boundary of a flash line.
 #[repr(align(16))]
-struct Cubic([f32; 4]);
+pub(super) struct Cubic([f32; 4]);
 
-static CUBIC: [Cubic; SATURATED as usize * CUBICS + 1] = cubics();
+/// The cubics, in the order of i.
+pub(super) static CUBIC: [Cubic; SATURATED as usize * CUBICS + 1] = cubics();
 
 const fn cubics() -> [Cubic; SATURATED as usize * CUBICS + 1] {
     let mut cubics = [const { Cubic([0.0; 4]) }; SATURATED as usize * CUBICS + 1];

@@ -1,7 +1,7 @@
 //! One case after the other, from the file.
 //!
 //! A case is eight u32 and data, all little-endian: kind (0: int8, 1: int16, 2: float), words of inputs, words of outputs, finish (integers: 0
-//! codes, 1 pre-activations, 2 sums; float: 1 with ReLU), largest code, words of the stream, byte offset of the stream from a word, zero; then
+//! rectified codes, 1 tanh, 2 sums, 3 linear codes; float: 1 with ReLU, 2 with tanh), largest code, words of the stream, byte offset of the stream from a word, zero; then
 //! inputs and stream. Kind 9 ends the file.
 
 use core::fmt;
@@ -78,16 +78,21 @@ pub(crate) fn run() -> Result<Counts, Error> {
         found.fill(0xdead_beef);
         twin.fill(0xdead_beef);
         if kind == 2 {
-            kernel::float(stream, inputs, finish == 1, found);
+            kernel::Float::new(stream, inputs.len() as u16, finish == 1, found.len() as u16).run(inputs, found);
             portable::float(stream, inputs, finish == 1, twin);
+            if finish == 2 {
+                kernel::tanh(found);
+                portable::tanh(twin);
+            }
         } else {
             let width = if kind == 0 { Width::Int8 } else { Width::Int16 };
             let finish = match finish {
                 0 => Finish::Codes { limit: limit as u16 },
-                1 => Finish::Preactivations,
-                _ => Finish::Sums,
+                1 => Finish::Tanh { limit: limit as u16 },
+                2 => Finish::Sums,
+                _ => Finish::Linear { limit: limit as u16 },
             };
-            kernel::integer(width, stream, inputs, finish, found);
+            kernel::Integer::new(width, stream, inputs.len(), finish).run(inputs, found);
             portable::integer(width, stream, inputs, finish, twin);
         }
         counts.cases += 1;
