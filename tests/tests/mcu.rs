@@ -75,13 +75,16 @@ fn the_kernels_keep_their_promises() {
     assert!(broken.is_empty(), "{broken:#?}");
 }
 
-/// Zeros and inputs far out of range take what typical inputs take, to the cycle.
+/// Zeros and inputs far out of range take what typical inputs take, to the cycle; with tanh within what the flash lines of its table
+/// make, which other values read.
 #[test]
 fn the_worst_case_of_int8_is_the_typical_case() {
     for row in RESULTS.rows.iter().filter(|row| row.kernel == "int8") {
         let cycles = &row.cycles_by_input;
         assert_eq!(cycles.len(), TYPICAL_ROWS + 2);
-        assert!(cycles.iter().all(|one| one == &cycles[0]), "{row:?}");
+        let [least, most] = [cycles.iter().min(), cycles.iter().max()].map(|cycles| *cycles.expect("inputs"));
+        let tanh = ["3-20-20-1", "shipped"].contains(&row.net);
+        assert!(if tanh { most as f64 <= 1.1 * least as f64 } else { most == least }, "{row:?}");
     }
 }
 
