@@ -169,13 +169,14 @@ static void on_translation(plugin_id id, struct qemu_plugin_tb *block) {
         struct instruction *i = calloc(1, sizeof *i); /* lives as long as the translation may */
         if (!i) abort();
         i->address = (uint32_t)qemu_plugin_insn_vaddr(source);
-        i->size = (uint8_t)qemu_plugin_insn_size(source);
 #if PLUGIN_API >= 3
         uint8_t bytes[4] = { 0 };
         qemu_plugin_insn_data(source, bytes, sizeof bytes);
 #else
         const uint8_t *bytes = qemu_plugin_insn_data(source);
 #endif
+        /* Not from QEMU 7, which is wrong about it at the ends of its pages of 1 KiB. */
+        i->size = bytes[1] >> 3 >= 0x1d ? 4 : 2;
         decode(i, bytes);
         qemu_plugin_register_vcpu_insn_exec_cb(source, on_instruction, NO_REGISTERS, i);
         qemu_plugin_register_vcpu_mem_cb(source, on_access, NO_REGISTERS, READS_AND_WRITES, i);

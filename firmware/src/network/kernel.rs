@@ -126,7 +126,7 @@ impl<'a> Integer<'a> {
         }
     }
 
-    /// Words of each input and weights of the layer.
+    /// Its blocks.
     pub(super) fn stream(&self) -> &'a [[u8; 4]] {
         self.stream
     }
