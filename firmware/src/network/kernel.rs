@@ -94,7 +94,7 @@ impl Finish {
     }
 }
 
-/// Which kernel [`integer`] and [`float`] run on an aligned stream.
+/// Which kernel [`Integer`] and [`Float`] run on an aligned stream.
 pub const NAME: &str = if cfg!(cortex_m4) { "Cortex-M4 assembly" } else { "portable" };
 
 /// An integer layer, checked once: an evaluation then checks two lengths alone.
