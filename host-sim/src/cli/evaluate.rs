@@ -64,11 +64,7 @@ struct Evaluation {
 
 impl Evaluate {
     pub(super) fn run(self, session: &Session) -> Result<()> {
-        let plant = self.situation.plant()?;
-        let plant = match self.extra_delay_ms {
-            0.0 => plant,
-            delay => Loop { condition: plant.condition.delayed(delay / 1e3), ..plant },
-        };
+        let plant = self.situation.plant()?.delayed(self.extra_delay_ms / 1e3);
         let seed = session.configuration.seed();
         let files = self.model.iter().map(|path| ModelFile::read(path)).collect::<Result<Vec<_>>>()?;
         for file in &files {

@@ -15,7 +15,7 @@ use super::{
     trajectory,
 };
 use crate::{
-    experiment::{Loop, Purpose, per_flight},
+    experiment::{Purpose, per_flight},
     report::{Method, PerFlight},
     rollout::{FlightPlan, FlightRecord},
 };
@@ -83,11 +83,7 @@ struct Flown {
 
 impl Fly {
     pub(super) fn run(self, session: &Session) -> Result<()> {
-        let plant = self.situation.plant()?;
-        let plant = match self.extra_delay_ms {
-            0.0 => plant,
-            delay => Loop { condition: plant.condition.delayed(delay / 1e3), ..plant },
-        };
+        let plant = self.situation.plant()?.delayed(self.extra_delay_ms / 1e3);
         let trajectory = trajectory::find(&self.trajectory)?.scaled(self.speed).sampled(plant.rate_hz())?;
         let file = self.model.as_deref().map(ModelFile::read).transpose()?;
         let model = file.as_ref().map(ModelFile::model).transpose()?;

@@ -133,7 +133,7 @@ impl Train {
         };
         session.console.stage("designing the feedback lane");
         let identification = if dithered.is_empty() { &logs } else { &dithered };
-        let lane = feedback::choose(session, &recipe, origin.plant.as_ref(), identification, &|lane| {
+        let lane = feedback::choose(session, &recipe, origin.plant.as_ref(), identification, &validation, &|lane| {
             encode(&describe(Some(lane), ""), Some(&learned.quantised), Precision::Int8, &learned.rows.calibration)
         });
         let (remarks, design, refusal) = match &lane {
@@ -194,7 +194,7 @@ fn check_movement(logs: &[FlightLog]) -> Result<()> {
     Ok(())
 }
 
-/// Passes epochs on; the two trainings are one count.
+/// Passes epochs on; all trainings are one count.
 fn watched<'a>(session: &'a Session, recipe: &Recipe) -> impl FnMut(Progress) + use<'a> {
     let of = (recipe.network.epochs * recipe.weight_decays.len() + recipe.fine_tuning.epochs) as u64;
     let mut done = 0;

@@ -162,7 +162,7 @@ pub fn best_in_flight(
     rows: &Rows,
 ) -> Result<usize, BuildError> {
     let lanes = Lanes { network: true, feedback: false };
-    let late = Loop { condition: plant.condition.delayed(LATE_S), ..plant.clone() };
+    let late = plant.delayed(LATE_S);
     let kinds: Vec<(&Loop, &[Trajectory])> = [plant, &late]
         .into_iter()
         .flat_map(|plant| validation.chunks(recipe.validation_strokes.max(1)).map(move |trajectories| (plant, trajectories)))

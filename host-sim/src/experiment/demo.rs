@@ -215,7 +215,7 @@ fn test(settings: &DemoSettings, plant: &Loop, built: &Built, seed: u64, advance
         advance();
     }
     if let (Some(&speed), true) = (settings.speeds.first(), settings.extra_delay_ms > 0.0) {
-        let late = Loop { condition: plant.condition.delayed(settings.extra_delay_ms / 1e3), ..plant.clone() };
+        let late = plant.delayed(settings.extra_delay_ms / 1e3);
         let trajectories = strokes(test_seed, settings.strokes, speed, plant.rate_hz())?;
         flights.extend(evaluate(built, &late, &trajectories, speed, test_seed, seed)?);
     }

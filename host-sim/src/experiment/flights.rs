@@ -43,6 +43,12 @@ impl Loop {
         Ok(Self { settings: rollout::settings(&vehicle, gains)?, vehicle, gains: gains.into(), condition })
     }
 
+    /// The same loop with `seconds` more delay in the whole of it ([`Condition::delayed`]).
+    #[must_use]
+    pub fn delayed(&self, seconds: f64) -> Self {
+        Self { condition: self.condition.delayed(seconds), ..self.clone() }
+    }
+
     /// Rate of the references, Hz.
     pub fn rate_hz(&self) -> f64 {
         f64::from(self.settings.rates.reference_hz())

@@ -256,8 +256,7 @@ fn flown(
 ) -> Result<(Vec<Candidate>, Vec<Score>), LaneRefusal> {
     let candidates = candidates(recipe, logs)?;
     let cases = &CASES;
-    let loops: Vec<Loop> =
-        cases.iter().map(|case| Loop { condition: plant.condition.delayed(case.delay_s), ..plant.clone() }).collect();
+    let loops: Vec<Loop> = cases.iter().map(|case| plant.delayed(case.delay_s)).collect();
     let baselines: Vec<Vec<f64>> =
         loops.iter().map(|plant| plant.errors(validation, None, 1.0, seed)).collect::<Result<_, _>>()?;
     let network_alone: Vec<Vec<f64>> = match candidates.first() {

@@ -4,23 +4,23 @@ use impromptu_model_export::{ExportError, description::LaneDescription};
 
 use super::super::Session;
 use crate::{
-    experiment::{LaneChoice, Loop, Purpose, Recipe, choose_lane, validation_strokes},
+    experiment::{LaneChoice, Loop, Purpose, Recipe, choose_lane},
     flight_log::FlightLog,
+    trajectory::Trajectory,
 };
 
-/// Designs lanes from `logs` and chooses one by flights of `plant`, or says why there is none.
+/// Designs lanes from `logs` and chooses one by flights of `plant` over the `validation` trajectories, or says why there is none.
 pub(super) fn choose(
     session: &Session,
     recipe: &Recipe,
     plant: Option<&Loop>,
     logs: &[FlightLog],
+    validation: &[Trajectory],
     encode: &(dyn Fn(&LaneDescription) -> Result<Vec<u8>, ExportError> + Sync),
 ) -> Result<LaneChoice, String> {
     let Some(plant) = plant else {
         return Err("it is chosen by simulated flights, and no vehicle was given; give --vehicle".into());
     };
-    let seed = session.configuration.seed();
-    let validation = validation_strokes(recipe, &recipe.validation_speeds, plant.rate_hz(), seed).map_err(|e| e.to_string())?;
     let flight_seed = session.configuration.seed_of(Purpose::Validation);
-    choose_lane(recipe, plant, logs, &validation, flight_seed, encode).map_err(|reason| reason.to_string())
+    choose_lane(recipe, plant, logs, validation, flight_seed, encode).map_err(|reason| reason.to_string())
 }
