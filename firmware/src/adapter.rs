@@ -4,6 +4,8 @@
 //! *never* a correction beyond the model's limits and slew, never any change of the desired reference when both lanes are off;
 //! *source* Zhou 2017, Fig. 1. What differs: the correction is ramped between sub-rate ticks, and a feedback lane adds to it.
 
+mod inference;
+mod ramp;
 mod signals;
 
 use crate::{
@@ -11,10 +13,12 @@ use crate::{
     feedback::AxisState,
     math::{clamp, finite_or_zero},
     model::{Interpolation, MAX_AXES, MAX_ERRORS, MAX_FEATURES, MAX_OUTPUTS, Model, Refusal, SignalTable},
-    network::{MAX_SCRATCH, Network, Scratch},
+    network::Scratch,
     preview::{EndRule, Preview},
 };
 
+pub use inference::{Inference, Job};
+use ramp::Ramp;
 use signals::{History, View, base_channels, same_signals};
 
 /// Sub-rate ticks of measured and reference history that features can read.
@@ -39,18 +43,21 @@ impl Lanes {
     pub const NONE: Self = Self { network: false, feedback: false };
 }
 
-/// Adapter for a loop with `D` desired, `M` measured and `R` reference channels, and a scratch of `S` words for the network (without a
-/// number: enough for any network).
+/// Adapter for a loop with `D` desired, `M` measured and `R` reference channels.
+///
+/// A reference tick is [`Adapter::begin`] and [`Adapter::finish`]. At a sub-rate tick the first gives the [`Job`] of evaluating the network,
+/// whose [`Inference`] is [delivered](Adapter::deliver): between the two ([`Adapter::step`] does it all), or, by a task that the
+/// control loop interrupts, until the next reference tick ([`Adapter::defer`]).
 #[derive(Debug)]
-pub struct Adapter<'m, const D: usize, const M: usize, const R: usize, const S: usize = MAX_SCRATCH> {
+pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
     model: &'m Model<'m>,
     /// Desired channel from which each reference channel starts.
     base: [usize; R],
     measured: History<M>,
     references: History<R>,
-    /// Network correction at the last and at the next sub-rate tick.
-    ramp: [[f32; MAX_OUTPUTS]; 2],
-    primed: bool,
+    ramp: Ramp,
+    /// Whether an inference may take up to the next reference tick.
+    deferred: bool,
     axes: [AxisState; MAX_AXES],
     lanes: Lanes,
     /// How far each lane is faded in, 0..=1.
@@ -61,15 +68,14 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize, const S: 
     loop_gain: f32,
     /// Recent peak of what is desired of the loop and of its errors ([`crate::model::Authority`]).
     vigour: f32,
-    scratch: Scratch<S>,
 }
 
-impl<'m, const D: usize, const M: usize, const R: usize, const S: usize> Adapter<'m, D, M, R, S> {
+impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     /// Ties a model to an application whose signals are `table`, whose references run at `rate_hz` and whose preview keeps
     /// `capacity` samples. Both lanes are off.
     ///
     /// # Errors
-    /// If signals, rate, preview length or scratch do not fit.
+    /// If signals, rate or preview length do not fit.
     pub fn new(model: &'m Model<'m>, table: &SignalTable<'_>, rate_hz: f32, capacity: usize) -> Result<Self, Refusal> {
         let card = model.card();
         same_signals(card, table, [D, M, R])?;
@@ -82,18 +88,14 @@ impl<'m, const D: usize, const M: usize, const R: usize, const S: usize> Adapter
         if past + future + 1 > capacity as u32 {
             return Err(Refusal::Preview { needed: past + future + 1, available: capacity as u32 });
         }
-        let words = model.network().map_or(0, Network::scratch_words);
-        if words > S {
-            return Err(Refusal::Shape { what: "words of the network's scratch", found: words as u32, limit: S as u32 });
-        }
         Ok(Self {
             model,
             base: base_channels(table),
             measured: History::new([EndRule::Hold; M], 0),
             // No sub-rate tick is that low: the first one that is seen starts the histories.
             references: History::new([EndRule::Hold; R], i32::MIN),
-            ramp: [[0.0; MAX_OUTPUTS]; 2],
-            primed: false,
+            ramp: Ramp::EMPTY,
+            deferred: false,
             axes: [AxisState::REST; MAX_AXES],
             lanes: Lanes::NONE,
             network_weight: 0.0,
@@ -102,7 +104,6 @@ impl<'m, const D: usize, const M: usize, const R: usize, const S: usize> Adapter
             saturations: 0,
             loop_gain: 1.0,
             vigour: 0.0,
-            scratch: Scratch::sized(),
         })
     }
 
@@ -131,12 +132,71 @@ impl<'m, const D: usize, const M: usize, const R: usize, const S: usize> Adapter
         self.saturations
     }
 
-    /// One reference tick: the reference that the loop shall track. `preview` should reach [`crate::model::Card::preview_span`]'s future ahead;
-    /// what is missing is taken as the trajectory's end.
-    pub fn step<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M]) -> [f32; R] {
-        let desired = preview.sample(tick);
-        let mut reference = self.base.map(|channel| desired.get(channel).copied().unwrap_or(0.0));
-        let network = self.network(tick, preview, measured, &reference);
+    /// Gives inferences time until the next reference tick. A ramped correction is the same as before: it starts from what was
+    /// evaluated a sub-rate tick ago. A held one comes a reference tick later.
+    pub fn defer(&mut self) {
+        self.deferred = true;
+    }
+
+    /// Inferences that did not come in time. The correction then stays as it is and fades out until one does.
+    pub fn late(&self) -> u32 {
+        self.ramp.late()
+    }
+
+    /// One reference tick with all that belongs to it: the reference that the loop shall track. `preview` should reach
+    /// [`crate::model::Card::preview_span`]'s future ahead; what is missing is taken as the trajectory's end. The scratch needs
+    /// [`crate::network::Network::scratch_words`].
+    pub fn step<const N: usize, const S: usize>(
+        &mut self,
+        tick: i32,
+        preview: &Preview<D, N>,
+        measured: &[f32; M],
+        scratch: &mut Scratch<S>,
+    ) -> [f32; R] {
+        if let Some(job) = self.begin(tick, preview, measured)
+            && let Some(network) = self.model.network()
+        {
+            self.deliver(job.run(network, scratch));
+        }
+        self.finish(tick, preview, measured)
+    }
+
+    /// First part of a reference tick: takes the inference that is due, remembers what was measured and, at a sub-rate tick of the network
+    /// lane, gives the job of evaluating the network.
+    pub fn begin<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M]) -> Option<Job> {
+        // A ramp ends where the inference of its start says, which is needed from the next reference tick on.
+        self.ramp.settle(tick);
+        let divisor = self.divisor();
+        if tick.rem_euclid(divisor) != 0 {
+            return None;
+        }
+        let base = self.base_reference(tick, preview);
+        self.align(tick.div_euclid(divisor), measured, &base);
+        if !(self.lanes.network || self.network_weight > 0.0) || self.model.network().is_none() {
+            self.ramp.clear();
+            return None;
+        }
+        let card = self.model.card();
+        let ahead = match card.timing.interpolation {
+            Interpolation::Hold => 0,
+            Interpolation::Linear => divisor,
+        };
+        let mut job = Job { tick, inputs: [0.0; MAX_FEATURES] };
+        let view = View { desired: preview, measured: &self.measured, references: &self.references, divisor };
+        features::evaluate(&card.features, &view, tick.wrapping_add(ahead), divisor, &mut job.inputs);
+        self.ramp.release(tick);
+        Some(job)
+    }
+
+    /// Takes the result of the last job; one that is not awaited any more is dropped.
+    pub fn deliver(&mut self, inference: Inference) {
+        self.ramp.deliver(inference);
+    }
+
+    /// Second part of a reference tick: the reference that the loop shall track.
+    pub fn finish<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M]) -> [f32; R] {
+        let mut reference = self.base_reference(tick, preview);
+        let network = self.network(tick);
         self.fade();
         let feedback = self.feedback(tick, preview, measured);
         // The slew may need longer than the fade: off is when nothing is left.
@@ -168,52 +228,25 @@ impl<'m, const D: usize, const M: usize, const R: usize, const S: usize> Adapter
         let step = if ticks == 0 { 1.0 } else { 1.0 / f32::from(ticks) };
         let approach = |weight: f32, on: bool| clamp(if on { weight + step } else { weight - step }, 0.0, 1.0);
         // The network lane has a value from its first sub-rate tick on: a fade that began before would end in a step.
-        let network = self.lanes.network && self.primed && self.model.network().is_some();
+        let network = self.lanes.network && self.ramp.current() && self.model.network().is_some();
         self.network_weight = approach(self.network_weight, network);
         self.feedback_weight = approach(self.feedback_weight, self.lanes.feedback && self.model.lane().is_some());
     }
 
-    /// The network lane's correction at this tick; `base` is the reference without any.
-    fn network<const N: usize>(
-        &mut self,
-        tick: i32,
-        preview: &Preview<D, N>,
-        measured: &[f32; M],
-        base: &[f32; R],
-    ) -> [f32; MAX_OUTPUTS] {
-        let timing = self.model.card().timing;
+    /// The reference without any correction.
+    fn base_reference<const N: usize>(&self, tick: i32, preview: &Preview<D, N>) -> [f32; R] {
+        let desired = preview.sample(tick);
+        self.base.map(|channel| desired.get(channel).copied().unwrap_or(0.0))
+    }
+
+    /// The network lane's correction at this tick.
+    fn network(&mut self, tick: i32) -> [f32; MAX_OUTPUTS] {
+        let interpolation = self.model.card().timing.interpolation;
+        if interpolation == Interpolation::Hold && !self.deferred {
+            self.ramp.publish();
+        }
         let divisor = self.divisor();
-        let phase = tick.rem_euclid(divisor);
-        if phase == 0 {
-            self.align(tick.div_euclid(divisor), measured, base);
-            if self.lanes.network || self.network_weight > 0.0 {
-                let [start, end] = &mut self.ramp;
-                *start = *end;
-                match timing.interpolation {
-                    Interpolation::Hold => self.ramp[0] = self.infer(tick, preview),
-                    Interpolation::Linear => {
-                        if !self.primed {
-                            self.ramp[0] = self.infer(tick, preview);
-                        }
-                        self.ramp[1] = self.infer(tick.wrapping_add(divisor), preview);
-                    }
-                }
-                self.primed = true;
-            } else {
-                self.primed = false;
-            }
-        }
-        if !self.primed {
-            return [0.0; MAX_OUTPUTS];
-        }
-        let [start, end] = &self.ramp;
-        match timing.interpolation {
-            Interpolation::Hold => *start,
-            Interpolation::Linear => {
-                let share = phase as f32 / divisor as f32;
-                core::array::from_fn(|i| start[i] + (end[i] - start[i]) * share)
-            }
-        }
+        self.ramp.value(interpolation, tick.rem_euclid(divisor), divisor)
     }
 
     /// Stores the measured channels of sub-rate tick `sub_tick`. Histories start anew with the first tick that is seen and after a gap;
@@ -223,22 +256,9 @@ impl<'m, const D: usize, const M: usize, const R: usize, const S: usize> Adapter
             self.measured = History::new([EndRule::Hold; M], sub_tick);
             self.references = History::new([EndRule::Hold; R], sub_tick.wrapping_sub(1));
             self.references.push(*base);
-            self.primed = false;
+            self.ramp.clear();
         }
         self.measured.push(measured.map(finite_or_zero));
-    }
-
-    /// Evaluates the network for the sub-rate tick that falls on reference tick `target`.
-    fn infer<const N: usize>(&mut self, target: i32, preview: &Preview<D, N>) -> [f32; MAX_OUTPUTS] {
-        let mut outputs = [0.0; MAX_OUTPUTS];
-        let Some(network) = self.model.network() else { return outputs };
-        let card = self.model.card();
-        let divisor = self.divisor();
-        let view = View { desired: preview, measured: &self.measured, references: &self.references, divisor };
-        let mut inputs = [0.0; MAX_FEATURES];
-        features::evaluate(&card.features, &view, target, divisor, &mut inputs);
-        network.evaluate(&inputs, &mut outputs, &mut self.scratch);
-        outputs.map(finite_or_zero)
     }
 
     /// Share of the fast clamps that the feedback lane may use at this tick, at which its axes have these errors.

@@ -8,9 +8,10 @@ use core::num::NonZeroU32;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    adapter::{Adapter, Lanes},
+    adapter::{Adapter, Inference, Job, Lanes},
     control::{Airframe, AttitudeGains, AttitudeLoop, Mixer, PositionGains, PositionLoop, ThrustVector},
     model::{Model, Refusal},
+    network::Scratch,
     preview::Preview,
     quadrotor::{self, DESIRED, MEASURED, REFERENCE},
     types::{MotorCommand, Reference, Setpoint, State, Tick},
@@ -102,6 +103,7 @@ impl<'m> Flight<'m> {
     /// If the model is for other signals, another rate, or a longer preview.
     pub fn attach(&mut self, model: &'m Model<'m>, settings: &Settings, lanes: Lanes) -> Result<(), Refusal> {
         let mut adapter = Adapter::new(model, &quadrotor::signals(), settings.rates.reference_hz(), PREVIEW)?;
+        adapter.defer();
         adapter.switch(lanes);
         self.adapter = Some(adapter);
         Ok(())
@@ -139,11 +141,24 @@ impl<'m> Flight<'m> {
         self.command_delay = ticks;
     }
 
-    /// One control tick.
-    pub fn step(&mut self, tick: Tick, state: &State) -> MotorCommand {
+    /// One control tick, the network included.
+    pub fn step<const S: usize>(&mut self, tick: Tick, state: &State, scratch: &mut Scratch<S>) -> MotorCommand {
+        let (command, job) = self.control(tick, state);
+        if let Some(job) = job
+            && let Some(network) = self.adapter.as_ref().and_then(|adapter| adapter.model().network())
+        {
+            self.deliver(job.run(network, scratch));
+        }
+        command
+    }
+
+    /// One control tick without the network, whose job a task of lower priority may do until the next reference tick
+    /// ([`Flight::deliver`]): the same bits as [`Flight::step`].
+    pub fn control(&mut self, tick: Tick, state: &State) -> (MotorCommand, Option<Job>) {
+        let mut job = None;
         if tick.0.is_multiple_of(self.position_divisor.get()) {
             let reference_tick = (tick.0 / self.position_divisor) as i32;
-            self.reference = self.adapted(reference_tick, state);
+            (self.reference, job) = self.adapted(reference_tick, state);
             if self.excitation != nalgebra::Vector3::zeros() {
                 self.reference.position += self.excitation;
             }
@@ -159,17 +174,28 @@ impl<'m> Flight<'m> {
             self.wanted = wanted;
         }
         let (thrust, moment) = self.attitude.step(&self.wanted, state);
-        self.mixer.mix(thrust, &moment)
+        (self.mixer.mix(thrust, &moment), job)
     }
 
-    fn adapted(&mut self, tick: i32, state: &State) -> Reference {
+    /// Takes what came of a job of [`Flight::control`].
+    pub fn deliver(&mut self, inference: Inference) {
+        if let Some(adapter) = &mut self.adapter {
+            adapter.deliver(inference);
+        }
+    }
+
+    fn adapted(&mut self, tick: i32, state: &State) -> (Reference, Option<Job>) {
         let desired = self.preview.sample(tick);
         let yaw = desired[9];
         match &mut self.adapter {
-            Some(adapter) => quadrotor::reference(&adapter.step(tick, &self.preview, &quadrotor::measured(state)), yaw),
+            Some(adapter) => {
+                let measured = quadrotor::measured(state);
+                let job = adapter.begin(tick, &self.preview, &measured);
+                (quadrotor::reference(&adapter.finish(tick, &self.preview, &measured), yaw), job)
+            }
             None => {
                 let [px, py, pz, vx, vy, vz, ..] = desired;
-                quadrotor::reference(&[px, py, pz, vx, vy, vz], yaw)
+                (quadrotor::reference(&[px, py, pz, vx, vy, vz], yaw), None)
             }
         }
     }

@@ -47,12 +47,13 @@ fn load(bytes: &[u8]) -> bool {
 fn fly(model: &Model<'_>) {
     let card = model.card();
     let Ok(mut adapter) = Adapter::<2, 2, 2>::new(model, &card.signals, card.timing.reference_rate_hz, PREVIEW) else { return };
+    let mut scratch = Scratch::new();
     adapter.switch(Lanes::BOTH);
     let mut preview = Preview::<2, PREVIEW>::new([EndRule::Hold; 2], 0);
     for tick in 0..24 {
         let value = EXTREMES[tick as usize % EXTREMES.len()];
         preview.push([value, -value]);
-        let reference = adapter.step(tick, &preview, &[-value, value]);
+        let reference = adapter.step(tick, &preview, &[-value, value], &mut scratch);
         let limits = card.outputs.iter().map(|output| output.limit);
         assert!(adapter.correction().iter().zip(limits).all(|(value, limit)| value.abs() <= limit), "{reference:?}");
     }

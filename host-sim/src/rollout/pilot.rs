@@ -5,6 +5,7 @@
 
 use impromptu_firmware::{
     flight::{Flight, PREVIEW, Settings},
+    network::Scratch,
     replay::Recorder,
     types::{State as FirmwareState, Tick},
 };
@@ -24,6 +25,7 @@ use crate::{
 pub(super) struct Pilot<'a> {
     pub(super) plan: FlightPlan<'a>,
     flight: Flight<'a>,
+    scratch: Scratch,
     sensors: Sensors,
     late: DelayLine<([f64; 3], [f64; 3])>,
     dither: Option<(Dither, Xoshiro256PlusPlus)>,
@@ -64,6 +66,7 @@ impl<'a> Pilot<'a> {
         }
         Ok(Self {
             flight,
+            scratch: Scratch::new(),
             sensors: Sensors::new(&condition.noise, plan.seed).map_err(|error| refuse(error.to_string()))?,
             late: DelayLine::new(ticks(condition.measurement_delay_s)).map_err(|error| refuse(error.to_string()))?,
             dither: plan.dither.map(|dither| (dither, Xoshiro256PlusPlus::seed_from_u64(plan.seed ^ 0x9b05_688c_2b3e_6c1f))),
@@ -97,7 +100,7 @@ impl<'a> Pilot<'a> {
             }
             self.dither(reference_tick);
         }
-        let command = self.flight.step(Tick(tick as u32), &self.known);
+        let command = self.flight.step(Tick(tick as u32), &self.known, &mut self.scratch);
         if let Some(recorder) = &mut self.recorder {
             recorder.tick(&self.known, &command, self.flight.reference());
         }

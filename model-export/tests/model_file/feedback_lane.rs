@@ -4,6 +4,7 @@ use impromptu_firmware::{
     adapter::{Adapter, Lanes},
     feedback::AxisState,
     model::{Model, Output},
+    network::Scratch,
     preview::{EndRule, Preview},
 };
 use impromptu_model_export::{
@@ -42,7 +43,7 @@ fn corrections(
     (-16..0).for_each(|tick| preview.push(desired(tick)));
     let step = |tick| {
         preview.push(desired(tick));
-        adapter.step(tick, &preview, &measured(tick));
+        adapter.step(tick, &preview, &measured(tick), &mut Scratch::new());
         adapter.correction()[0]
     };
     (0..ticks).map(step).collect()
@@ -180,7 +181,7 @@ fn limited_outputs_enter_the_lags_as_applied() {
     let mut preview = Preview::<2, CAPACITY>::new([EndRule::Hold, EndRule::Zero], 0);
     let mut step = |tick, error| {
         preview.push([0.0, 0.0]);
-        adapter.step(tick, &preview, &[error, 0.0]);
+        adapter.step(tick, &preview, &[error, 0.0], &mut Scratch::new());
         adapter.correction()[0]
     };
     assert_eq!(step(0, -0.1), 0.02);

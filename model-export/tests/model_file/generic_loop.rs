@@ -4,6 +4,7 @@ use impromptu_firmware::{
     adapter::{Adapter, Lanes},
     features::{Feature, Relative, Source},
     model::{Interpolation, Model, Output},
+    network::Scratch,
     preview::{EndRule, Preview},
 };
 use impromptu_model_export::{
@@ -75,7 +76,7 @@ fn tracking_error(lanes: Lanes) -> f64 {
     let ticks = 6000;
     for tick in 0..ticks {
         preview.push([desired(tick + 1) as f32]);
-        let [u] = adapter.step(tick, &preview, &x.map(|x| x as f32));
+        let [u] = adapter.step(tick, &preview, &x.map(|x| x as f32), &mut Scratch::new());
         x = [x[1], -0.15 * x[0] + 0.8 * x[1] + f64::from(u)];
         let y = -0.2 * x[0] + x[1];
         sum += (y - desired(tick + 1)).powi(2);

@@ -7,6 +7,7 @@ use impromptu_firmware::{
     control::{Airframe, AttitudeGains, PositionGains},
     flight::{Flight, Rates, Settings},
     model::Model,
+    network::Scratch,
     replay::{Event, Recorded, Recorder},
     types::{MotorCommand, Setpoint, State, Tick},
 };
@@ -95,6 +96,7 @@ pub(crate) fn fly(addon: Option<(&Model<'_>, Lanes)>, ticks: u32, switches: impl
     let settings = settings();
     let mut recorder = Recorder::new(&settings, addon);
     let mut flight = Flight::new(&settings).unwrap();
+    let mut scratch = Scratch::new();
     if let Some((model, lanes)) = addon {
         flight.attach(model, &settings, lanes).unwrap();
     }
@@ -134,7 +136,7 @@ pub(crate) fn fly(addon: Option<(&Model<'_>, Lanes)>, ticks: u32, switches: impl
             rates: vehicle.rates.cast(),
             vertical_acceleration: 0.0,
         };
-        let command = flight.step(Tick(tick), &state);
+        let command = flight.step(Tick(tick), &state, &mut scratch);
         recorder.tick(&state, &command, flight.reference());
         vehicle.step(&settings.airframe, &command);
     }

@@ -8,6 +8,7 @@ use impromptu_firmware::{
     adapter::Lanes,
     flight::Flight,
     model::{Model, Refusal},
+    network::Scratch,
     replay::{Event, HEADER, Header, RECORD, RecordingError, answer},
     types::Tick,
 };
@@ -147,6 +148,8 @@ fn fly(
     clock: &Clock,
     cost: &mut Cost,
 ) -> Result<u32, ReplayError> {
+    static SCRATCH: StaticCell<Scratch> = StaticCell::new();
+    let scratch = SCRATCH.init_with(Scratch::new);
     let mut answers = File::create(c"answers.bin").map_err(in_answers)?;
     let mut tick = 0;
     loop {
@@ -155,7 +158,7 @@ fn fly(
         let event = Event::from_bytes(&record).map_err(|error| ReplayError::Recording(tick, error))?;
         match event {
             Event::Tick(state) => {
-                let (command, instructions) = counter.measure(|| flight.step(Tick(tick), &state));
+                let (command, instructions) = counter.measure(|| flight.step(Tick(tick), &state, scratch));
                 cost.of(tick, clock.reference, clock.sub_rate).add(instructions);
                 answers.write_all(&answer(&command, flight.reference())).map_err(in_answers)?;
                 tick += 1;

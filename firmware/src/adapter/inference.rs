@@ -1,0 +1,37 @@
+//! The network lane's work, apart from the control loop: features in, correction out.
+//!
+//! *in* the features of one sub-rate tick; *out* the network's outputs for it; *never* anything else that is shared with the control
+//! loop, so that a task of lower priority can do it; *source* ours.
+
+use crate::{
+    math::finite_or_zero,
+    model::{MAX_FEATURES, MAX_OUTPUTS},
+    network::{Network, Scratch},
+};
+
+/// One evaluation of the network that is to be done.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Job {
+    /// Reference tick at which it was released.
+    pub tick: i32,
+    /// The model's features, in physical units; zeros behind the last.
+    pub inputs: [f32; MAX_FEATURES],
+}
+
+/// One evaluation of the network that was done.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inference {
+    /// Reference tick of its [`Job`].
+    pub tick: i32,
+    /// Correction of each output of the model.
+    pub outputs: [f32; MAX_OUTPUTS],
+}
+
+impl Job {
+    /// Evaluates the network. With a scratch of fewer words than the network needs every correction is zero.
+    pub fn run<const S: usize>(&self, network: &Network<'_>, scratch: &mut Scratch<S>) -> Inference {
+        let mut outputs = [0.0; MAX_OUTPUTS];
+        network.evaluate(&self.inputs, &mut outputs, scratch);
+        Inference { tick: self.tick, outputs: outputs.map(finite_or_zero) }
+    }
+}

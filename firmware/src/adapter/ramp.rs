@@ -1,0 +1,135 @@
+//! What becomes of inferences between sub-rate ticks: held or ramped, and what happens when one is late.
+//!
+//! *in* when a job was released, and its inference when it comes; *out* the network lane's correction at every reference tick; *never* a
+//! step when an inference is late: the correction stays where it is; *source* ours, for Zhou 2017's sub-rate.
+
+use super::Inference;
+use crate::model::{Interpolation, MAX_OUTPUTS};
+
+/// The correction between two sub-rate ticks.
+#[derive(Clone, Debug)]
+pub(super) struct Ramp {
+    start: [f32; MAX_OUTPUTS],
+    end: [f32; MAX_OUTPUTS],
+    primed: bool,
+    /// Reference tick whose inference is awaited, and the newest that came.
+    awaited: Option<i32>,
+    delivered: Option<Inference>,
+    missing: bool,
+    late: u32,
+}
+
+impl Ramp {
+    /// Nothing has been evaluated yet.
+    pub(super) const EMPTY: Self = Self {
+        start: [0.0; MAX_OUTPUTS],
+        end: [0.0; MAX_OUTPUTS],
+        primed: false,
+        awaited: None,
+        delivered: None,
+        missing: false,
+        late: 0,
+    };
+
+    /// A job was released at this reference tick.
+    pub(super) fn release(&mut self, tick: i32) {
+        self.awaited = Some(tick);
+    }
+
+    /// Takes the result of the last job; one that is not awaited any more is dropped.
+    pub(super) fn deliver(&mut self, inference: Inference) {
+        if self.awaited == Some(inference.tick) {
+            self.delivered = Some(inference);
+        }
+    }
+
+    /// Makes the inference that was released at another tick than this one the new end, if it came.
+    pub(super) fn settle(&mut self, tick: i32) {
+        if self.awaited.is_some_and(|released| released != tick) {
+            self.publish();
+        }
+    }
+
+    /// Makes the awaited inference, if there is one, the new end at once.
+    pub(super) fn publish(&mut self) {
+        let Some(awaited) = self.awaited.take() else { return };
+        let inference = self.delivered.take().filter(|inference| inference.tick == awaited);
+        self.missing = inference.is_none();
+        self.start = self.end;
+        match inference {
+            Some(Inference { outputs, .. }) => {
+                if !self.primed {
+                    self.start = outputs;
+                }
+                self.end = outputs;
+                self.primed = true;
+            }
+            None => self.late = self.late.saturating_add(1),
+        }
+    }
+
+    /// Forgets everything but the count of late inferences.
+    pub(super) fn clear(&mut self) {
+        *self = Self { late: self.late, ..Self::EMPTY };
+    }
+
+    /// Whether there is a correction, and the newest inference was in time.
+    pub(super) fn current(&self) -> bool {
+        self.primed && !self.missing
+    }
+
+    /// Inferences that did not come in time.
+    pub(super) fn late(&self) -> u32 {
+        self.late
+    }
+
+    /// The correction `phase` reference ticks after the last of the sub-rate ticks, which are `divisor` apart.
+    pub(super) fn value(&self, interpolation: Interpolation, phase: i32, divisor: i32) -> [f32; MAX_OUTPUTS] {
+        match interpolation {
+            _ if !self.primed => [0.0; MAX_OUTPUTS],
+            Interpolation::Linear if phase != 0 => {
+                let share = phase as f32 / divisor as f32;
+                let mut between = self.start;
+                for (value, end) in between.iter_mut().zip(&self.end) {
+                    *value += (end - *value) * share;
+                }
+                between
+            }
+            // At a sub-rate tick the ramp of the last one has ended.
+            _ => self.end,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn inference(tick: i32, value: f32) -> Inference {
+        Inference { tick, outputs: [value; MAX_OUTPUTS] }
+    }
+
+    #[test]
+    fn a_late_inference_is_counted_and_the_correction_stays_until_one_is_in_time() {
+        let mut ramp = Ramp::EMPTY;
+        let value = |ramp: &Ramp, phase| ramp.value(Interpolation::Linear, phase, 4)[0];
+        ramp.release(0);
+        assert_eq!(value(&ramp, 0), 0.0);
+        ramp.deliver(inference(0, 2.0));
+        ramp.settle(1);
+        assert_eq!([1, 2, 3].map(|phase| value(&ramp, phase)), [2.0; 3]);
+        ramp.release(4);
+        // The result of another tick is not the awaited one.
+        ramp.deliver(inference(0, 9.0));
+        ramp.settle(5);
+        assert!(!ramp.current() && ramp.late() == 1);
+        assert_eq!([1, 3].map(|phase| value(&ramp, phase)), [2.0; 2]);
+        // It comes when nobody waits for it any more.
+        ramp.deliver(inference(4, 9.0));
+        ramp.release(8);
+        ramp.deliver(inference(8, 6.0));
+        ramp.settle(9);
+        assert!(ramp.current() && ramp.late() == 1);
+        assert_eq!([1, 2, 0].map(|phase| value(&ramp, phase)), [3.0, 4.0, 6.0]);
+    }
+}
