@@ -129,6 +129,11 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         &self.correction
     }
 
+    /// How far the network lane and the feedback lane are faded in, 0..=1.
+    pub fn weights(&self) -> [f32; 2] {
+        [self.network_weight, self.feedback_weight]
+    }
+
     /// Ticks in which a limit or the slew bounded the correction.
     pub fn saturations(&self) -> u32 {
         self.saturations

@@ -129,6 +129,12 @@ impl<'m> Flight<'m> {
         &self.reference
     }
 
+    /// Where the vehicle is desired to be at a control tick, m, world ENU; of the position loop's last tick.
+    pub fn desired_position(&self, tick: Tick) -> nalgebra::Vector3<f32> {
+        let [x, y, z, ..] = self.preview.sample((tick.0 / self.position_divisor) as i32);
+        nalgebra::Vector3::new(x, y, z)
+    }
+
     /// Adds an offset, m, world ENU, to the position reference from the next reference tick on: the independent dither without which
     /// the closed loop cannot be identified. Zero leaves every bit as it is.
     pub fn excite(&mut self, offset: nalgebra::Vector3<f32>) {

@@ -39,4 +39,8 @@ pub mod exchange;
 
 pub mod link;
 
+pub mod autopilot;
+
+pub mod application;
+
 pub mod replay;

@@ -34,6 +34,12 @@ impl<const BYTES: usize> Place<BYTES> {
         place.copy_from_slice(file);
         Some(place)
     }
+
+    /// Lets `read` write a file here, of the length that it returns.
+    pub fn fill(&mut self, read: impl FnOnce(&mut [u8]) -> usize) -> &[u8] {
+        let length = read(&mut self.0);
+        self.0.get(..length).unwrap_or_default()
+    }
 }
 
 impl<const BYTES: usize> Default for Place<BYTES> {

@@ -1,0 +1,135 @@
+//! The autopilot behind its serial line: bytes in, bytes out, one step at each control tick.
+//!
+//! *in* bytes as they come, control ticks, results of the tasks of lower priority; *out* motor commands, jobs for those tasks, bytes to be
+//! sent; *never* a wait, or more work in a tick than the bytes it is given and one step; *source* ours.
+
+mod upload;
+
+use heapless::Vec;
+
+use crate::{
+    adapter::{Inference, Job},
+    autopilot::{Autopilot, Meters, Reaction},
+    link::{Commands, FRAME, Fault, Message, Order, Outcome, Reason, Received, Receiver, Report, Sender, message::FrameReport},
+    types::MotorCommand,
+};
+
+pub use upload::{Upload, WORDS};
+
+/// Bytes that can wait to be sent: what a tick says at most, and some acknowledgements.
+pub const OUTBOX: usize = 4 * FRAME;
+/// Control ticks from one telemetry report to the next.
+const TELEMETRY_TICKS: u32 = 50;
+
+/// Name and version of this firmware.
+pub const SOFTWARE: &str = concat!("impromptu ", env!("CARGO_PKG_VERSION"));
+
+/// An autopilot that talks.
+#[derive(Debug)]
+pub struct Application<'m> {
+    autopilot: Autopilot<'m>,
+    receiver: Receiver<Commands>,
+    voice: Voice,
+    /// Control ticks until the next telemetry report.
+    telemetry: u32,
+}
+
+/// Messages to bytes that wait to be sent.
+#[derive(Debug)]
+struct Voice {
+    sender: Sender,
+    outbox: Vec<u8, OUTBOX>,
+}
+
+impl Voice {
+    /// A message for which there is no room is dropped: the line is slower than the reports, and the next one tells more.
+    fn say(&mut self, message: &impl Message) {
+        let mut frame = [0; FRAME];
+        if let Some((_, frame)) = self.sender.encode(message, &mut frame) {
+            let _ = self.outbox.extend_from_slice(frame);
+        }
+    }
+}
+
+impl<'m> Application<'m> {
+    /// An application that has heard and said nothing.
+    pub fn new(autopilot: Autopilot<'m>) -> Self {
+        let voice = Voice { sender: Sender::new(), outbox: Vec::new() };
+        Self { autopilot, receiver: Receiver::new(), voice, telemetry: TELEMETRY_TICKS }
+    }
+
+    /// Takes a byte from the line. A command that concerns the flash is for a task which may wait; its outcome is for
+    /// [`Application::acknowledge`].
+    pub fn hear(&mut self, byte: u8) -> Option<Upload> {
+        let Self { autopilot, receiver, voice, .. } = self;
+        let (sequence, outcome) = match receiver.push(byte)? {
+            Ok(Received { sequence, order, message }) => {
+                let upload = Upload::new(sequence, &message);
+                if upload.is_some() && order != Order::Late {
+                    if !autopilot.armed() {
+                        return upload;
+                    }
+                    (sequence, Outcome::Refused(Reason::Armed))
+                } else {
+                    match autopilot.obey(&Received { sequence, order, message }) {
+                        Reaction::Silence => return None,
+                        Reaction::Introduce => {
+                            voice.say(&Report::Identity(autopilot.identity(SOFTWARE)));
+                            return None;
+                        }
+                        Reaction::Acknowledge(outcome) => (sequence, outcome),
+                    }
+                }
+            }
+            Err(Fault::Message { sequence, reason }) => (sequence, Outcome::Refused(reason)),
+            Err(_) => return None,
+        };
+        voice.say(&Report::Acknowledge { sequence, outcome });
+        None
+    }
+
+    /// Tells the sender what became of a command that a task of lower priority carried out.
+    pub fn acknowledge(&mut self, sequence: u8, outcome: Outcome) {
+        self.voice.say(&Report::Acknowledge { sequence, outcome });
+    }
+
+    /// Whether a new attitude came since the last tick.
+    pub fn informed(&self) -> bool {
+        self.autopilot.informed()
+    }
+
+    /// Takes what came of a job.
+    pub fn deliver(&mut self, inference: Inference) {
+        self.autopilot.deliver(inference);
+    }
+
+    /// One control tick.
+    pub fn step(&mut self, meters: &Meters) -> (MotorCommand, Option<Job>) {
+        let flew = self.autopilot.armed();
+        let (command, job) = self.autopilot.step();
+        if flew {
+            self.voice.say(&Report::Motors(self.autopilot.motors(&command)));
+        }
+        self.telemetry = self.telemetry.saturating_sub(1);
+        if self.telemetry == 0 {
+            self.telemetry = TELEMETRY_TICKS;
+            let frames = self.frames();
+            self.voice.say(&Report::Telemetry(self.autopilot.telemetry(meters, frames)));
+        }
+        (command, job)
+    }
+
+    /// The bytes that wait to be sent.
+    pub fn outbox(&self) -> &[u8] {
+        &self.voice.outbox
+    }
+
+    /// Forgets the bytes that waited: they are sent.
+    pub fn sent(&mut self) {
+        self.voice.outbox.clear();
+    }
+
+    fn frames(&self) -> FrameReport {
+        self.receiver.counts().report()
+    }
+}

@@ -1,0 +1,306 @@
+//! The vehicle on its link: what it is told, what it does, and what it does when it is told nothing.
+//!
+//! *in* the link's commands and control ticks; *out* a motor command at every tick; *never* motors that turn while disarmed, or for longer
+//! than [`Patience::motors_s`] without news of attitude and position; *source* ours.
+//!
+//! | what arrives | what happens |
+//! |---|---|
+//! | nothing for a while | the newest state is held; after [`Patience::lanes_s`] the add-on fades out, after [`Patience::motors_s`] motors off, disarmed |
+//! | a state that is older than the newest | ignored |
+//! | a setpoint after a gap | the gap is filled in a straight line |
+//! | a setpoint that is stored already | ignored |
+//! | no setpoint any more | the end of the trajectory is held |
+
+mod news;
+
+use crate::{
+    adapter::{Inference, Job, Lanes},
+    flight::{Flight, PREVIEW, Settings},
+    link::{
+        Command, Order, Outcome, Reason, Received,
+        message::{FrameReport, Identity, LaneReport, Motors, Telemetry, TimedSetpoint},
+    },
+    math::sqrt,
+    model::{Model, Refusal},
+    types::{MotorCommand, Reference, Setpoint, State, Tick},
+};
+
+use news::News;
+pub use news::Patience;
+
+/// The model that flies and the slot that it is in (`None`: a part of the firmware).
+pub type Flown<'m> = (&'m Model<'m>, Option<u8>);
+
+/// What a board measures of itself; the unit of costs is the board's (instructions or cycles).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Meters {
+    /// Largest cost of a control tick.
+    pub control_max: u32,
+    /// Largest cost of an inference.
+    pub inference_max: u32,
+    /// High-water mark of the stack, bytes.
+    pub stack_bytes: u32,
+    /// Largest delay from the tick's interrupt to the control task.
+    pub entry_latency_max: u32,
+    /// Control ticks that were not done when the next one was due.
+    pub deadline_misses: u32,
+}
+
+/// What is done with a command.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reaction {
+    /// Nothing is said.
+    Silence,
+    /// The vehicle says who it is.
+    Introduce,
+    /// The sender is told what became of the command.
+    Acknowledge(Outcome),
+}
+
+/// The flight stack with arming, and with patience for a link that fails.
+#[derive(Debug)]
+pub struct Autopilot<'m> {
+    flight: Flight<'m>,
+    settings: Settings,
+    model: Option<Flown<'m>>,
+    lanes: Lanes,
+    state: State,
+    news: News,
+    /// Control ticks since the motors were armed.
+    tick: Tick,
+    armed: bool,
+    /// The newest setpoint, from which a gap is filled.
+    setpoint: Setpoint,
+    /// Mean square of the tracking error over about the last second, m².
+    error_square: f32,
+}
+
+impl<'m> Autopilot<'m> {
+    /// A disarmed vehicle with these settings and, if there is one, this model; both lanes are off.
+    ///
+    /// # Errors
+    /// If the model does not fit the flight stack. An airframe that cannot be mixed gives `Ok(None)`.
+    pub fn new(settings: &Settings, model: Option<Flown<'m>>) -> Result<Option<Self>, Refusal> {
+        let Some(flight) = stack(settings, model)? else { return Ok(None) };
+        Ok(Some(Self {
+            flight,
+            settings: *settings,
+            model,
+            lanes: Lanes::NONE,
+            state: State::default(),
+            news: News::new(settings),
+            tick: Tick(0),
+            armed: false,
+            setpoint: Setpoint::default(),
+            error_square: 0.0,
+        }))
+    }
+
+    /// Whether the motors may turn.
+    pub fn armed(&self) -> bool {
+        self.armed
+    }
+
+    /// Whether a new attitude came since the last tick.
+    pub fn informed(&self) -> bool {
+        self.news.informed()
+    }
+
+    /// Obeys a command, or does not; models are the board's affair.
+    pub fn obey(&mut self, received: &Received<Command<'_>>) -> Reaction {
+        let outcome = match (&received.message, received.order) {
+            (Command::Hello, _) => return Reaction::Introduce,
+            (Command::Inertial(inertial), _) => {
+                if self.news.inertial(inertial.tick) {
+                    inertial.apply(&mut self.state);
+                }
+                return Reaction::Silence;
+            }
+            (Command::Position(position), _) => {
+                if self.news.position(position.tick) {
+                    position.apply(&mut self.state);
+                }
+                return Reaction::Silence;
+            }
+            (Command::Setpoint(setpoint), _) => match self.follow(setpoint) {
+                Ok(()) => return Reaction::Silence,
+                Err(reason) => Err(reason),
+            },
+            // An order that was overtaken by a younger one is out of date.
+            (_, Order::Late) => return Reaction::Silence,
+            (Command::Settings(settings), _) => self.set(settings),
+            (Command::Lanes(lanes), _) => self.switch(*lanes),
+            (Command::Arm, _) => self.arm(),
+            (Command::Disarm, _) => {
+                self.disarm();
+                Ok(())
+            }
+            (Command::ModelBegin { .. } | Command::ModelChunk(_) | Command::ModelCommit, _) => Err(Reason::Storage),
+        };
+        Reaction::Acknowledge(match outcome {
+            Ok(()) => Outcome::Done,
+            Err(reason) => Outcome::Refused(reason),
+        })
+    }
+
+    /// One control tick: what the motors get, and the network's job if there is one for a task of lower priority.
+    pub fn step(&mut self) -> (MotorCommand, Option<Job>) {
+        self.news.tick();
+        if !self.armed {
+            return (MotorCommand::OFF, None);
+        }
+        if self.news.motors_off() {
+            self.disarm();
+            return (MotorCommand::OFF, None);
+        }
+        let lanes = if self.news.lanes_off() { Lanes::NONE } else { self.lanes };
+        if let Some(adapter) = self.flight.adapter() {
+            adapter.switch(lanes);
+        }
+        let (command, job) = self.flight.control(self.tick, &self.state);
+        self.tick.0 = self.tick.0.wrapping_add(1);
+        self.watch();
+        (command, job)
+    }
+
+    /// Takes what came of a job.
+    pub fn deliver(&mut self, inference: Inference) {
+        self.flight.deliver(inference);
+    }
+
+    /// The reference that the loop tracks now.
+    pub fn reference(&self) -> &Reference {
+        self.flight.reference()
+    }
+
+    /// What the motors got in the last tick, as the link says it.
+    pub fn motors(&self, command: &MotorCommand) -> Motors {
+        Motors::new(Tick(self.tick.0.wrapping_sub(1)), command, self.flight.reference())
+    }
+
+    /// Who this is.
+    pub fn identity<'a>(&'a self, software: &'a str) -> Identity<'a> {
+        let model = self.model.map(|(model, slot)| crate::link::message::FlyingModel {
+            name: model.card().name,
+            checksum: model.checksum(),
+            slot,
+        });
+        Identity::new(software, model)
+    }
+
+    /// How the vehicle is.
+    pub fn telemetry(&mut self, meters: &Meters, frames: FrameReport) -> Telemetry {
+        let (network, feedback, late_inferences, saturations) = match self.flight.adapter() {
+            Some(adapter) => {
+                let [network, feedback] = adapter.weights();
+                let lane = |weight| LaneReport { weight, ..LaneReport::default() };
+                (lane(network), lane(feedback), adapter.late(), adapter.saturations())
+            }
+            None => Default::default(),
+        };
+        Telemetry {
+            tick: self.tick.0,
+            armed: self.armed,
+            network,
+            feedback,
+            late_inferences,
+            saturations,
+            frames,
+            tracking_error: sqrt(self.error_square),
+            control_max: meters.control_max,
+            inference_max: meters.inference_max,
+            stack_bytes: meters.stack_bytes,
+            entry_latency_max: meters.entry_latency_max,
+            deadline_misses: meters.deadline_misses,
+        }
+    }
+
+    fn set(&mut self, settings: &Settings) -> Result<(), Reason> {
+        if self.armed {
+            return Err(Reason::Armed);
+        }
+        match stack(settings, self.model) {
+            Ok(Some(flight)) => {
+                (self.flight, self.settings, self.news) = (flight, *settings, News::new(settings));
+                Ok(())
+            }
+            Ok(None) => Err(Reason::Settings),
+            Err(refusal) => Err(Reason::Model((&refusal).into())),
+        }
+    }
+
+    fn switch(&mut self, lanes: Lanes) -> Result<(), Reason> {
+        let model = self.model.map(|(model, _)| model);
+        let missing = (lanes.network && model.and_then(Model::network).is_none())
+            || (lanes.feedback && model.and_then(Model::lane).is_none());
+        if missing {
+            return Err(Reason::NoModel);
+        }
+        self.lanes = lanes;
+        Ok(())
+    }
+
+    fn arm(&mut self) -> Result<(), Reason> {
+        if self.armed {
+            return Err(Reason::Armed);
+        }
+        if self.news.lanes_off() {
+            return Err(Reason::NoState);
+        }
+        if self.flight.next_setpoint() == 0 {
+            return Err(Reason::Setpoint { expected: 0 });
+        }
+        (self.armed, self.tick, self.error_square) = (true, Tick(0), 0.0);
+        Ok(())
+    }
+
+    /// Motors off. The next flight begins with a trajectory of its own, and with nothing left of this one.
+    fn disarm(&mut self) {
+        (self.armed, self.news) = (false, News::new(&self.settings));
+        if let Ok(Some(flight)) = stack(&self.settings, self.model) {
+            self.flight = flight;
+        }
+    }
+
+    /// Appends a sample of the desired trajectory, and what was lost before it.
+    fn follow(&mut self, timed: &TimedSetpoint) -> Result<(), Reason> {
+        let next = self.flight.next_setpoint();
+        let setpoint = timed.setpoint();
+        let gap = timed.tick.wrapping_sub(next);
+        if gap < 0 {
+            return Ok(());
+        }
+        // What lies further ahead than the preview would push out the present.
+        if gap >= PREVIEW as i32 || (next == 0 && gap > 0) {
+            return Err(Reason::Setpoint { expected: next });
+        }
+        let start = self.setpoint;
+        for missing in 1..=gap {
+            let share = missing as f32 / (gap + 1) as f32;
+            self.flight.push_setpoint(&Setpoint {
+                position: start.position.lerp(&setpoint.position, share),
+                velocity: start.velocity.lerp(&setpoint.velocity, share),
+                acceleration: start.acceleration.lerp(&setpoint.acceleration, share),
+                yaw: start.yaw + (setpoint.yaw - start.yaw) * share,
+            });
+        }
+        self.flight.push_setpoint(&setpoint);
+        self.setpoint = setpoint;
+        Ok(())
+    }
+
+    /// Follows the tracking error, for the telemetry.
+    fn watch(&mut self) {
+        let error = self.state.position - self.flight.desired_position(Tick(self.tick.0.wrapping_sub(1)));
+        let share = 1.0 / self.settings.rates.control_hz.max(1.0);
+        self.error_square += (error.norm_squared() - self.error_square) * share;
+    }
+}
+
+fn stack<'m>(settings: &Settings, model: Option<Flown<'m>>) -> Result<Option<Flight<'m>>, Refusal> {
+    let Some(mut flight) = Flight::new(settings) else { return Ok(None) };
+    if let Some((model, _)) = model {
+        flight.attach(model, settings, Lanes::NONE)?;
+    }
+    Ok(Some(flight))
+}

@@ -1,0 +1,119 @@
+//! How old the vehicle's knowledge of itself is.
+//!
+//! *in* the sender's ticks of what arrived, and control ticks; *out* when the add-on, and when the motors have to go off; *never* an older
+//! state for a newer one; *source* ours.
+
+use crate::flight::Settings;
+
+/// How long the vehicle goes on with what it knows, s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Patience {
+    /// Attitude and rates that are older turn the add-on off: it would learn of its own effect too late.
+    pub lanes_inertial_s: f32,
+    /// The same for position and velocity.
+    pub lanes_position_s: f32,
+    /// Attitude and rates that are older turn the motors off: the vehicle has turned by half a radian by then.
+    pub motors_inertial_s: f32,
+    /// The same for position and velocity, without which the attitude is still held.
+    pub motors_position_s: f32,
+}
+
+impl Default for Patience {
+    fn default() -> Self {
+        Self { lanes_inertial_s: 0.02, lanes_position_s: 0.1, motors_inertial_s: 0.25, motors_position_s: 0.5 }
+    }
+}
+
+/// A kind of news.
+#[derive(Clone, Copy, Debug)]
+struct Source {
+    /// The sender's tick of the newest.
+    stamp: Option<u32>,
+    /// Control ticks since it came.
+    age: u32,
+    lanes: u32,
+    motors: u32,
+}
+
+impl Source {
+    fn new(control_hz: f32, lanes_s: f32, motors_s: f32) -> Self {
+        // Saturates; not a number counts as none.
+        Self { stamp: None, age: u32::MAX, lanes: (lanes_s * control_hz) as u32, motors: (motors_s * control_hz) as u32 }
+    }
+
+    /// Whether this is newer than the newest.
+    fn hear(&mut self, stamp: u32) -> bool {
+        // A sender that was silent for long may have started again.
+        let fresh = self.age > self.motors;
+        let newer = fresh || self.stamp.is_none_or(|newest| stamp.wrapping_sub(newest).wrapping_sub(1) < u32::MAX / 2);
+        if newer {
+            (self.stamp, self.age) = (Some(stamp), 0);
+        }
+        newer
+    }
+}
+
+/// Ages of both parts of the state.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct News {
+    inertial: Source,
+    position: Source,
+}
+
+impl News {
+    pub(super) fn new(settings: &Settings) -> Self {
+        let patience = Patience::default();
+        let rate = settings.rates.control_hz;
+        Self {
+            inertial: Source::new(rate, patience.lanes_inertial_s, patience.motors_inertial_s),
+            position: Source::new(rate, patience.lanes_position_s, patience.motors_position_s),
+        }
+    }
+
+    /// Attitude and rates came; whether they are newer.
+    pub(super) fn inertial(&mut self, stamp: u32) -> bool {
+        self.inertial.hear(stamp)
+    }
+
+    /// Position and velocity came; whether they are newer.
+    pub(super) fn position(&mut self, stamp: u32) -> bool {
+        self.position.hear(stamp)
+    }
+
+    /// Whether a new attitude came since the last control tick.
+    pub(super) fn informed(&self) -> bool {
+        self.inertial.age == 0
+    }
+
+    /// A control tick passes.
+    pub(super) fn tick(&mut self) {
+        for source in [&mut self.inertial, &mut self.position] {
+            source.age = source.age.saturating_add(1);
+        }
+    }
+
+    /// Whether the state is too old for the add-on.
+    pub(super) fn lanes_off(&self) -> bool {
+        self.inertial.age > self.inertial.lanes || self.position.age > self.position.lanes
+    }
+
+    /// Whether the state is too old to fly on.
+    pub(super) fn motors_off(&self) -> bool {
+        self.inertial.age > self.inertial.motors || self.position.age > self.position.motors
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_newer_stamps_are_news_also_when_they_wrap_or_start_again() {
+        let mut source = Source::new(500.0, 0.02, 0.25);
+        assert!(source.hear(u32::MAX));
+        assert!(!source.hear(u32::MAX) && !source.hear(u32::MAX - 3));
+        assert!(source.hear(0) && source.hear(7) && !source.hear(6));
+        source.age = 126;
+        assert!(source.hear(3), "a sender that starts again");
+    }
+}
