@@ -35,4 +35,6 @@ pub mod quadrotor;
 
 pub mod flight;
 
+pub mod storage;
+
 pub mod replay;
