@@ -124,6 +124,28 @@ fn an_error_of_the_driver_at_any_call_is_reported_and_loses_nothing() {
     }
 }
 
+#[test]
+fn a_bit_that_the_flash_does_not_keep_is_found_before_the_old_model_is_given_up() {
+    let supply = Supply::new();
+    let third = named(b"third");
+    let calls = 1 + third.len().div_ceil(32) + 1;
+    let mut damaged_headers = 0;
+    for (call, seed) in (0..calls).flat_map(|call| (0..30).map(move |seed| (call, seed))) {
+        let mut slots = holding::<4, CAPACITY>(&supply, &[FLOAT, INTEGER], 7, 0);
+        supply.borrow_mut().restore(None, None, seed);
+        supply.borrow_mut().weak = Some(call);
+        let mut uploader = storage::open(&mut slots, anything).1;
+        let result = update(&mut uploader, &third);
+        damaged_headers += usize::from(result == Err(StorageError::ReadBack));
+        if result.is_err() {
+            assert_eq!(uploader.begin(Arming::Disarmed, 900, 0), Ok(0), "the upload can be begun again");
+        }
+        // A bit may also be one that is cleared anyway.
+        assert_eq!(boot(&slots).as_deref(), Some(if result.is_ok() { &*third } else { INTEGER }), "{result:?}");
+    }
+    assert!(damaged_headers > 5);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 

@@ -18,6 +18,8 @@ pub(crate) struct Supply {
     pub(crate) bytes: usize,
     /// Call of the driver, from 0, that fails half way with an error.
     pub(crate) failure: Option<usize>,
+    /// Call of the driver, from 0, that succeeds but for one bit, which stays cleared.
+    pub(crate) weak: Option<usize>,
     /// Calls of the driver until now.
     pub(crate) calls: usize,
     dead: bool,
@@ -27,12 +29,20 @@ pub(crate) struct Supply {
 impl Supply {
     pub(crate) fn new() -> Rc<RefCell<Self>> {
         let generator = Xoshiro256PlusPlus::seed_from_u64(9);
-        Rc::new(RefCell::new(Self { cut: None, bytes: 0, failure: None, calls: 0, dead: false, generator }))
+        Rc::new(RefCell::new(Self { cut: None, bytes: 0, failure: None, weak: None, calls: 0, dead: false, generator }))
     }
 
     /// Starts counting anew, with the power on.
     pub(crate) fn restore(&mut self, cut: Option<usize>, failure: Option<usize>, seed: u64) {
-        *self = Self { cut, failure, bytes: 0, calls: 0, dead: false, generator: Xoshiro256PlusPlus::seed_from_u64(seed) };
+        *self = Self {
+            cut,
+            failure,
+            weak: None,
+            bytes: 0,
+            calls: 0,
+            dead: false,
+            generator: Xoshiro256PlusPlus::seed_from_u64(seed),
+        };
     }
 
     /// What becomes of a call that erases or programs so many bytes.
@@ -86,6 +96,14 @@ impl<const WRITE: usize, const ERASE: usize> Simulated<WRITE, ERASE> {
 
     pub(crate) fn flip(&mut self, bit: usize) {
         self.cells.0[bit / 8] ^= 1 << (bit % 8);
+    }
+
+    /// Clears a bit of these bytes if the call just made is the weak one.
+    fn weaken(&mut self, range: std::ops::Range<usize>) {
+        let supply = &mut *self.supply.borrow_mut();
+        if supply.weak.is_some_and(|call| call + 1 == supply.calls) {
+            self.cells.0[supply.generator.random_range(range)] &= !(1 << supply.generator.random_range(0..8));
+        }
     }
 
     /// A cut while these bytes are erased: cells rise in any order, and some are anything.
@@ -150,6 +168,7 @@ impl<const WRITE: usize, const ERASE: usize> NorFlash for Simulated<WRITE, ERASE
         if let Outcome::Torn(_) = outcome {
             self.tear_erase(whole.end..whole.end + ERASE, end - whole.end);
         }
+        self.weaken(from..to);
         result(&outcome)
     }
 
@@ -172,6 +191,7 @@ impl<const WRITE: usize, const ERASE: usize> NorFlash for Simulated<WRITE, ERASE
                 *cell = if torn { self.supply.borrow_mut().generator.random() } else { *cell & byte };
             }
         }
+        self.weaken(offset..offset + bytes.len());
         result(&outcome)
     }
 }
