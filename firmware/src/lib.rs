@@ -9,7 +9,7 @@
 //!
 //! `no_std`, no heap, no unsafe code but in the Cortex-M4 kernels, no clock: time is an argument. SI units; world frame ENU (z up), body frame FLU, Hamilton quaternion
 //! body to world, f32. The same bits on the host and on a Cortex-M4F. Errors exist where bytes enter
-//! ([`model::Model::from_bytes`]); in flight nothing returns a `Result`.
+//! ([`model::Model::from_bytes`], [`storage`]); in flight nothing returns a `Result`.
 #![cfg_attr(not(test), no_std)]
 // Tests may compare with the standard library.
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
@@ -42,5 +42,7 @@ pub mod link;
 pub mod autopilot;
 
 pub mod application;
+
+pub mod storage;
 
 pub mod replay;

@@ -49,7 +49,7 @@ pub const ALIGNMENT: usize = 16;
 /// Largest file that is accepted: the F405's upper flash half.
 pub const MAX_FILE: usize = 512 * 1024;
 
-const CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
+pub(crate) const CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
 /// Check sum of a file: everything but the check sum's own four bytes.
 pub fn checksum(bytes: &[u8]) -> u32 {

@@ -1,0 +1,84 @@
+//! Models in flash, which an upload replaces without a new program.
+//!
+//! *in* two [`Slot`]s of NOR flash; *out* the newest model that this machine flies, in place, and an [`Uploader`] for the other slot;
+//! *never*, wherever the power is cut, none where there was one, or a mix of two; *source* two slots with a commit record written last.
+//!
+//! A slot is a [`Header`] and behind it the model file. An upload erases the slot that does not fly, writes the file, checks it as it
+//! stands in the flash, and last writes the header, whose own CRC tells whether it is whole: until then the old model is the newest one. The
+//! slot that flies is borrowed by its model, so no code can write to it.
+//!
+//! ```
+//! use impromptu_firmware::storage::{self, Arming, RamFlash};
+//! # let file: &[u8] = include_bytes!("../../tests/golden/models/int8-lane.model");
+//! # let checksum = impromptu_firmware::model::file::checksum(file);
+//!
+//! let mut slots = [RamFlash::<4096>::new(), RamFlash::new()];
+//! let (stored, mut uploader) = storage::open(&mut slots, |_| Ok(()));
+//! assert!(stored.is_none());
+//! let mut next = uploader.begin(Arming::Disarmed, file.len() as u32, checksum)?;
+//! while let Some(chunk) = file.get(next as usize..).and_then(|rest| rest.chunks(100).next()) {
+//!     next = uploader.write(Arming::Disarmed, next, chunk)?;
+//! }
+//! uploader.commit(Arming::Disarmed, |_| Ok(()))?;
+//!
+//! let (stored, _) = storage::open(&mut slots, |_| Ok(()));
+//! assert_eq!(stored.map(|stored| stored.checksum()), Some(checksum));
+//! # Ok::<(), storage::StorageError>(())
+//! ```
+//!
+//! The crates that keep data in NOR flash do not serve: `sequential-storage` 8 and `ekv` 1 copy an item out of pages into a buffer, where
+//! the kernels read a model of up to 100 KB in place, contiguous and on a boundary of 16 bytes. The former's items are shorter than 64 KB, the
+//! latter's records are cut into chunks; both are async. Only the traits of `embedded-storage` are used.
+
+mod error;
+mod header;
+mod ram;
+mod stored;
+mod uploader;
+
+use embedded_storage::nor_flash::NorFlash;
+
+use crate::model::{Model, Refusal};
+
+pub use error::{Operation, StorageError};
+pub use header::{HEADER, Header, MAGIC, Sequence, VERSION};
+pub use ram::RamFlash;
+pub use stored::{Place, Stored, Survey, survey};
+pub use uploader::{Arming, Uploader};
+
+/// A part of the flash that is erased alone and can be read in place.
+///
+/// Offsets of the driver start at the slot's first byte, and its capacity is the slot's: [`Uploader`] erases all of it. The first byte
+/// lies on a boundary of 16 bytes.
+///
+/// A board gets the bytes of its sectors without unsafe code from a static of zeros whose name memory.x places there and does not load, as
+/// it does with `IMPROMPTU_WEIGHTS`. It reads the static through [`core::hint::black_box`]: otherwise the compiler, who knows nothing of
+/// uploads, reads the zeros. For a model that lives as long as the program the slots are `&'static mut`, or the board calls [`survey`] with
+/// two `&'static [u8]` and makes the flash driver a slot for the spare one alone.
+pub trait Slot: NorFlash {
+    /// What the flash holds now, all of it. On a board with a cache before its flash, erasing and writing also empty the cache.
+    fn bytes(&self) -> &[u8];
+}
+
+impl<S: Slot> Slot for &mut S {
+    fn bytes(&self) -> &[u8] {
+        S::bytes(self)
+    }
+}
+
+/// Start-up: the newest model that is intact and passes `check` (signals, rate, preview of the application), and an uploader for the slot
+/// that it does not lie in.
+pub fn open<'a, S: Slot>(
+    slots: &'a mut [S; 2],
+    check: impl Fn(&Model<'_>) -> Result<(), Refusal>,
+) -> (Option<Stored<'a>>, Uploader<&'a mut S>) {
+    let Survey { flies, spare, sequence } = survey(slots.each_ref().map(Slot::bytes), check);
+    let found = flies.is_some();
+    let [first, second] = slots;
+    let (kept, spare) = match spare {
+        Place::First => (&*second, first),
+        Place::Second => (&*first, second),
+    };
+    let stored = if found { Stored::read(kept.bytes()).ok() } else { None };
+    (stored, Uploader::new(spare, sequence))
+}

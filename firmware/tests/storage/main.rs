@@ -1,0 +1,8 @@
+//! A model is replaced in flash whole or not at all.
+
+mod flash;
+mod models;
+
+mod cuts;
+mod damage;
+mod uploads;
