@@ -55,6 +55,11 @@ impl Condition {
         }
     }
 
+    /// Delay of the position loop's command in control ticks.
+    pub fn command_delay_ticks(&self, control_hz: f64) -> u32 {
+        (self.command_delay_s * control_hz).round() as u32
+    }
+
     /// The same with `seconds` more delay in the whole position loop: its commands arrive later.
     #[must_use]
     pub fn delayed(&self, seconds: f64) -> Self {

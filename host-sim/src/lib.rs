@@ -5,10 +5,12 @@
 
 pub mod cli;
 pub mod condition;
+pub mod emulator;
 pub mod examples;
 pub mod experiment;
 pub mod feedback_design;
 pub mod flight_log;
+pub mod pil;
 pub mod plant;
 pub mod report;
 pub mod rollout;

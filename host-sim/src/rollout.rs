@@ -4,6 +4,7 @@
 //! or on the number of threads; *source* Zhou 2017, Fig. 1; rates of `impromptu_firmware::flight::Rates`.
 
 mod pilot;
+mod stack;
 
 use impromptu_firmware::{
     adapter::Lanes,
@@ -24,6 +25,8 @@ use crate::{
     weather::Weather,
 };
 use pilot::Pilot;
+pub use stack::FlightStack;
+use stack::Software;
 
 /// An independent excitation of the position reference: random signs, held for `hold_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -176,7 +179,8 @@ pub fn fly(
         .par_iter()
         .map(|group| {
             let plans: Vec<&FlightPlan<'_>> = group.iter().map(|&index| &plans[index]).collect();
-            let records = Group::new(vehicle, settings, condition, &plans)?.fly();
+            let stacks = plans.iter().map(|plan| Software::new(vehicle, settings, condition, plan)).collect::<Result<_, _>>()?;
+            let records = Group::new(vehicle, settings, condition, &plans, stacks)?.fly();
             Ok(group.iter().copied().zip(records).collect())
         })
         .collect::<Result<_, RolloutError>>()?;
@@ -187,22 +191,38 @@ pub fn fly(
     Ok(records)
 }
 
+/// Flies one plan with a flight stack of its own: the same flight as [`fly`]'s, to the bit, if the stack gives the same bits.
+///
+/// # Errors
+/// If the plan cannot be flown.
+pub fn fly_on(
+    stack: impl FlightStack,
+    vehicle: &Vehicle,
+    settings: &Settings,
+    condition: &Condition,
+    plan: &FlightPlan<'_>,
+) -> Result<FlightRecord, RolloutError> {
+    let records = Group::new(vehicle, settings, condition, &[plan], vec![stack])?.fly();
+    Ok(records.into_iter().next().unwrap_or_default())
+}
+
 /// Flights that run in step.
-struct Group<'a> {
+struct Group<'a, S> {
     plant: Plant,
     states: States,
     weather: Weather,
-    pilots: Vec<Pilot<'a>>,
+    pilots: Vec<Pilot<'a, S>>,
     rates: Rates,
     rotor_speed_max: f64,
 }
 
-impl<'a> Group<'a> {
+impl<'a, S: FlightStack> Group<'a, S> {
     fn new(
         vehicle: &Vehicle,
         settings: &Settings,
         condition: &Condition,
         plans: &[&FlightPlan<'a>],
+        stacks: Vec<S>,
     ) -> Result<Self, RolloutError> {
         let rates = settings.rates;
         let tick = 1.0 / f64::from(rates.control_hz);
@@ -210,10 +230,10 @@ impl<'a> Group<'a> {
         let mut seeds = [0; LANES];
         let mut states = States::splat(&State::at_rest([0.0; 3]));
         let mut pilots = Vec::with_capacity(LANES);
-        for (lane, plan) in plans.iter().enumerate() {
+        for (lane, (plan, stack)) in plans.iter().zip(stacks).enumerate() {
             variations[lane] = plan.variation;
             seeds[lane] = plan.seed;
-            let pilot = Pilot::new(vehicle, settings, condition, (*plan).clone(), tick)?;
+            let pilot = Pilot::new(stack, settings, condition, (*plan).clone(), tick)?;
             let hover = plan.variation.payload_factor * vehicle.mass * crate::plant::GRAVITY
                 / (4.0 * vehicle.thrust_coefficient * plan.variation.thrust_factor);
             let mut state = State::at_rest(plan.trajectory.samples[0].position);

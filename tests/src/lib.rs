@@ -3,6 +3,7 @@
 
 pub mod board;
 pub mod decoder;
-pub mod emulator;
 pub mod golden;
 pub mod mcu;
+
+pub use impromptu_host_sim::emulator;

@@ -17,4 +17,5 @@ mod demo;
 mod emulator;
 mod kernels;
 mod mcu;
+mod pil;
 mod unsafe_code;

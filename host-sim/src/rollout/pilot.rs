@@ -4,8 +4,7 @@
 //! where the vehicle would have a measurement; *source* Zhou 2017, Fig. 1.
 
 use impromptu_firmware::{
-    flight::{Flight, PREVIEW, Settings},
-    network::Scratch,
+    flight::{PREVIEW, Settings},
     replay::Recorder,
     types::{State as FirmwareState, Tick},
 };
@@ -13,19 +12,18 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::{Dither, FlightPlan, FlightRecord, RolloutError, setpoint};
+use super::{Dither, FlightPlan, FlightRecord, RolloutError, setpoint, stack::FlightStack};
 use crate::{
     condition::Condition,
     flight_log::{FlightLog, LogRow},
-    plant::{State, Vehicle},
+    plant::State,
     sensors::{DelayLine, Sensors},
 };
 
 /// What one vehicle is told of where it is, and what is remembered of its flight.
-pub(super) struct Pilot<'a> {
+pub(super) struct Pilot<'a, S> {
     pub(super) plan: FlightPlan<'a>,
-    flight: Flight<'a>,
-    scratch: Scratch,
+    stack: S,
     sensors: Sensors,
     late: DelayLine<([f64; 3], [f64; 3])>,
     dither: Option<(Dither, Xoshiro256PlusPlus)>,
@@ -36,9 +34,9 @@ pub(super) struct Pilot<'a> {
     recorder: Option<Recorder<Vec<u8>>>,
 }
 
-impl<'a> Pilot<'a> {
+impl<'a, S: FlightStack> Pilot<'a, S> {
     pub(super) fn new(
-        vehicle: &Vehicle,
+        mut stack: S,
         settings: &Settings,
         condition: &Condition,
         plan: FlightPlan<'a>,
@@ -50,23 +48,14 @@ impl<'a> Pilot<'a> {
             return Err(RolloutError::Rate { name: plan.trajectory.name.clone(), found: plan.trajectory.rate_hz, expected });
         }
         let ticks = |seconds: f64| (seconds / tick).round() as usize;
-        let mut flight = Flight::new(settings).ok_or_else(|| RolloutError::Airframe(vehicle.name.clone()))?;
-        if let Some((model, lanes)) = plan.model {
-            flight.attach(model, settings, lanes)?;
-            if let Some(adapter) = flight.adapter() {
-                adapter.set_loop_gain(plan.loop_gain);
-            }
-        }
-        flight.set_command_delay(ticks(condition.command_delay_s) as u32);
         let mut recorder = plan.record.then(|| Recorder::new(settings, plan.model));
         for sample in plan.trajectory.samples.iter().take(PREVIEW / 2 + PREVIEW / 4) {
             let setpoint = setpoint(sample);
-            flight.push_setpoint(&setpoint);
+            stack.push_setpoint(&setpoint);
             recorder.iter_mut().for_each(|recorder| recorder.setpoint(&setpoint));
         }
         Ok(Self {
-            flight,
-            scratch: Scratch::new(),
+            stack,
             sensors: Sensors::new(&condition.noise, plan.seed).map_err(|error| refuse(error.to_string()))?,
             late: DelayLine::new(ticks(condition.measurement_delay_s)).map_err(|error| refuse(error.to_string()))?,
             dither: plan.dither.map(|dither| (dither, Xoshiro256PlusPlus::seed_from_u64(plan.seed ^ 0x9b05_688c_2b3e_6c1f))),
@@ -92,17 +81,17 @@ impl<'a> Pilot<'a> {
             let (position, velocity) = self.sensors.position_and_velocity(&seen);
             self.known.position = Vector3::from(position.map(|value| value as f32));
             self.known.velocity = Vector3::from(velocity.map(|value| value as f32));
-            let next = self.flight.next_setpoint() as usize;
+            let next = self.stack.next_setpoint() as usize;
             if let Some(sample) = self.plan.trajectory.samples.get(next) {
                 let setpoint = setpoint(sample);
-                self.flight.push_setpoint(&setpoint);
+                self.stack.push_setpoint(&setpoint);
                 self.recorder.iter_mut().for_each(|recorder| recorder.setpoint(&setpoint));
             }
             self.dither(reference_tick);
         }
-        let command = self.flight.step(Tick(tick as u32), &self.known, &mut self.scratch);
+        let command = self.stack.step(Tick(tick as u32), &self.known);
         if let Some(recorder) = &mut self.recorder {
-            recorder.tick(&self.known, &command, self.flight.reference());
+            recorder.tick(&self.known, &command, self.stack.reference());
         }
         if tick.is_multiple_of(divisor) {
             self.score(reference_tick, state);
@@ -117,7 +106,7 @@ impl<'a> Pilot<'a> {
             let bits = random.random::<u64>();
             let sign = |bit: u32| if (bits >> bit) & 1 == 1 { dither.amplitude } else { -dither.amplitude };
             let offset = Vector3::new(sign(60) as f32, sign(61) as f32, sign(62) as f32);
-            self.flight.excite(offset);
+            self.stack.excite(offset);
             self.recorder.iter_mut().for_each(|recorder| recorder.excitation(offset));
         }
     }
@@ -125,7 +114,7 @@ impl<'a> Pilot<'a> {
     fn score(&mut self, reference_tick: usize, state: &State) {
         let trajectory = self.plan.trajectory;
         let Some(desired) = trajectory.samples.get(reference_tick) else { return };
-        let reference = self.flight.reference();
+        let reference = self.stack.reference();
         if trajectory.scored.contains(&reference_tick) {
             for axis in 0..3 {
                 let error = desired.position[axis] - state.position[axis];

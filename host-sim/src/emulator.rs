@@ -10,7 +10,7 @@ use std::{
     hash::{DefaultHasher, Hash, Hasher},
     io::{ErrorKind, Read},
     path::{Path, PathBuf},
-    process::{Command, ExitStatus, Stdio},
+    process::{Child, Command, ExitStatus, Stdio},
     sync::{Mutex, PoisonError},
     thread,
     time::Duration,
@@ -110,19 +110,10 @@ pub fn run(elf: &Path, working_dir: &Path, timeout: Duration) -> Result<Output> 
 pub fn run_with(further: &[&str], elf: &Path, working_dir: &Path, timeout: Duration) -> Result<Output> {
     let runner = runner()?;
     let (program, arguments) = runner.split_first().context("the runner is empty")?;
-    let mut child = Command::new(program)
-        .args(further)
-        .args(arguments)
-        .arg(elf)
-        .current_dir(working_dir)
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .map_err(|error| match error.kind() {
-            ErrorKind::NotFound if working_dir.is_dir() => missing_emulator(program),
-            _ => anyhow!(error).context(format!("cannot start {program} in {}", working_dir.display())),
-        })?;
+    ensure!(working_dir.is_dir(), "cannot start {program} in {}", working_dir.display());
+    let mut command = Command::new(program);
+    command.args(further).args(arguments).arg(elf).current_dir(working_dir);
+    let mut child = spawn(command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()))?;
     // Drained while it runs: a full pipe would stop the emulator.
     let stdout = drain(child.stdout.take());
     let stderr = drain(child.stderr.take());
@@ -137,6 +128,33 @@ pub fn run_with(further: &[&str], elf: &Path, working_dir: &Path, timeout: Durat
         bail!("{} did not end within {} s and was stopped; it printed:\n{stdout}{stderr}", elf.display(), timeout.as_secs_f64());
     };
     Ok(Output { status, stdout, stderr })
+}
+
+/// The emulator as cargo would start it, but with this virtual clock and this serial port; the ELF file comes next.
+pub fn command(icount: &str, serial: &str) -> Result<Command> {
+    let mut runner = runner()?;
+    for (option, value) in [("-icount", icount), ("-serial", serial)] {
+        let place = runner.iter().position(|word| word == option).and_then(|place| runner.get_mut(place + 1));
+        *place.with_context(|| format!("the runner has no option {option}"))? = value.into();
+    }
+    let (program, arguments) = runner.split_first().context("the runner is empty")?;
+    let mut command = Command::new(program);
+    command.args(arguments);
+    Ok(command)
+}
+
+/// Starts the emulator.
+///
+/// # Errors
+/// If it is not installed, with the line that installs it.
+pub fn spawn(command: &mut Command) -> Result<Child> {
+    command.spawn().map_err(|error| {
+        let program = command.get_program().to_string_lossy().into_owned();
+        match error.kind() {
+            ErrorKind::NotFound => missing_emulator(&program),
+            _ => anyhow!(error).context(format!("cannot start {program}")),
+        }
+    })
 }
 
 /// Reads a pipe to its end in the background.
@@ -232,7 +250,7 @@ pub fn compiler() -> Result<String> {
 }
 
 /// Where the firmware is built and flown.
-pub(crate) fn target_folder() -> PathBuf {
+pub fn target_folder() -> PathBuf {
     match env::var_os("CARGO_TARGET_DIR") {
         Some(folder) => workspace().join(folder).join("firmware"),
         None => workspace().join("target/firmware"),

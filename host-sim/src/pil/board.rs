@@ -1,0 +1,267 @@
+//! The microcontroller as a flight stack.
+
+use std::time::{Duration, Instant};
+
+use impromptu_firmware::{
+    adapter::Lanes,
+    flight::Settings,
+    link::{
+        Command, FRAME, Outcome, Receiver, Report, Reports, Sender,
+        message::{Inertial, Position, Telemetry, TimedSetpoint},
+    },
+    types::{MotorCommand, Reference, Setpoint, State, Tick},
+};
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use super::{Line, PilError};
+use crate::rollout::FlightStack;
+
+/// How long a serial line may take to answer.
+const PATIENCE: Duration = Duration::from_millis(500);
+/// Bytes that the firmware's queue of a serial line takes at once.
+const QUEUE: usize = 1024;
+
+/// What the microcontroller measured of itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Figures {
+    /// Control ticks that were not done when the next one was due.
+    pub deadline_misses: u32,
+    /// Most instructions of a control tick, the link included.
+    pub control_instructions_max: u32,
+    /// Most instructions of an inference.
+    pub inference_instructions_max: u32,
+    /// Most instructions from the tick's interrupt to the control task.
+    pub entry_instructions_max: u32,
+    /// High-water mark of the stack, bytes.
+    pub stack_bytes: u32,
+    /// Inferences that were late.
+    pub late_inferences: u32,
+    /// Frames that did not arrive as they were sent.
+    pub dropped: u32,
+}
+
+/// A firmware at the other end of a line.
+pub struct Board<L> {
+    line: L,
+    sender: Sender,
+    receiver: Receiver<Reports>,
+    /// Frames of the next exchange.
+    outgoing: Vec<u8>,
+    telemetry: Telemetry,
+    /// What the last exchange brought.
+    motors: Option<(Tick, MotorCommand, Reference)>,
+    refusals: Vec<(&'static str, impromptu_firmware::link::Reason)>,
+    /// Commands whose acknowledgement is awaited.
+    awaited: Vec<(u8, &'static str)>,
+    model: Option<Option<u32>>,
+    /// Reports that did not arrive.
+    lost: u32,
+    failure: Option<std::io::Error>,
+    lockstep: bool,
+}
+
+impl<L: Line> Board<L> {
+    /// A firmware that has just started; `lockstep`: its control ticks wait for the line.
+    pub fn new(line: L, lockstep: bool) -> Self {
+        Self {
+            line,
+            sender: Sender::new(),
+            receiver: Receiver::new(),
+            outgoing: Vec::new(),
+            telemetry: Telemetry::default(),
+            motors: None,
+            refusals: Vec::new(),
+            awaited: Vec::new(),
+            model: None,
+            lost: 0,
+            failure: None,
+            lockstep,
+        }
+    }
+
+    /// Asks the firmware who it is; the check sum of its model.
+    ///
+    /// # Errors
+    /// If it does not answer.
+    pub fn introduce(&mut self) -> Result<Option<u32>, PilError> {
+        for _ in 0..3 {
+            self.tell("who it is", &Command::Hello);
+            self.talk(|board| board.model.is_some());
+            if let Some(model) = self.model {
+                return Ok(model);
+            }
+        }
+        Err(self.failed("who it is"))
+    }
+
+    /// Prepares a flight: settings, lanes. The trajectory is uploaded by [`FlightStack::push_setpoint`].
+    ///
+    /// # Errors
+    /// If the firmware refuses.
+    pub fn prepare(&mut self, settings: &Settings, lanes: Option<Lanes>) -> Result<BoardFlight<'_, L>, PilError> {
+        self.tell("disarm", &Command::Disarm);
+        self.tell("settings", &Command::Settings(*settings));
+        self.tell("lanes", &Command::Lanes(lanes.unwrap_or(Lanes::NONE)));
+        self.talk(|board| board.awaited.is_empty());
+        self.refused()?;
+        if let Some((_, command)) = self.awaited.first() {
+            return Err(PilError::Silence(command));
+        }
+        Ok(BoardFlight { divisor: settings.rates.position_divisor.max(1), next: 0, reference: Reference::default(), board: self })
+    }
+
+    /// What the firmware measured of itself, as it last told.
+    pub fn figures(&self) -> Figures {
+        let telemetry = &self.telemetry;
+        Figures {
+            deadline_misses: telemetry.deadline_misses,
+            control_instructions_max: telemetry.control_max,
+            inference_instructions_max: telemetry.inference_max,
+            entry_instructions_max: telemetry.entry_latency_max,
+            stack_bytes: telemetry.stack_bytes,
+            late_inferences: telemetry.late_inferences,
+            dropped: telemetry.frames.dropped + telemetry.frames.damaged + self.lost,
+        }
+    }
+
+    /// The last telemetry report.
+    pub fn telemetry(&self) -> &Telemetry {
+        &self.telemetry
+    }
+
+    /// Ends the firmware.
+    pub fn end(mut self) {
+        self.line.end();
+    }
+
+    fn tell(&mut self, name: &'static str, command: &Command<'_>) {
+        let mut frame = [0; FRAME];
+        // Every command of this file fits into a frame.
+        let Some((sequence, frame)) = self.sender.encode(command, &mut frame) else { return };
+        self.outgoing.extend(frame);
+        if matches!(command, Command::Settings(_) | Command::Lanes(_) | Command::Arm | Command::Disarm) {
+            self.awaited.push((sequence, name));
+        }
+    }
+
+    /// Sends what was told and hears until `done`, or until patience ends.
+    fn talk(&mut self, done: impl Fn(&Self) -> bool) {
+        let outgoing = std::mem::take(&mut self.outgoing);
+        let answer = self.line.exchange(&outgoing);
+        self.hear(answer);
+        let start = Instant::now();
+        while !self.lockstep && !done(self) && self.failure.is_none() && start.elapsed() < PATIENCE {
+            let answer = self.line.wait(PATIENCE);
+            self.hear(answer);
+        }
+    }
+
+    fn hear(&mut self, bytes: std::io::Result<Vec<u8>>) {
+        let bytes = match bytes {
+            Ok(bytes) => bytes,
+            Err(error) => {
+                self.failure.get_or_insert(error);
+                return;
+            }
+        };
+        for byte in bytes {
+            match self.receiver.push(byte) {
+                Some(Ok(received)) => match received.message {
+                    Report::Motors(motors) => {
+                        let [px, py, pz, vx, vy, vz] = motors.reference;
+                        let reference =
+                            Reference { position: Vector3::new(px, py, pz), velocity: Vector3::new(vx, vy, vz), yaw: 0.0 };
+                        self.motors = Some((Tick(motors.tick), motors.command(), reference));
+                    }
+                    Report::Telemetry(telemetry) => self.telemetry = telemetry,
+                    Report::Identity(identity) => self.model = Some(identity.model.map(|model| model.checksum)),
+                    Report::Acknowledge { sequence, outcome } => {
+                        let place = self.awaited.iter().position(|(awaited, _)| *awaited == sequence);
+                        let command = place.map_or("a command", |place| self.awaited.remove(place).1);
+                        if let Outcome::Refused(reason) = outcome {
+                            self.refusals.push((command, reason));
+                        }
+                    }
+                },
+                Some(Err(_)) => self.lost += 1,
+                None => {}
+            }
+        }
+    }
+
+    fn refused(&mut self) -> Result<(), PilError> {
+        match self.refusals.pop() {
+            Some((command, reason)) => Err(PilError::Refused { command, reason }),
+            None => self.failure.take().map_or(Ok(()), |error| Err(PilError::Line(error, String::new()))),
+        }
+    }
+
+    fn failed(&mut self, what: &'static str) -> PilError {
+        self.failure.take().map_or(PilError::Silence(what), |error| PilError::Line(error, String::new()))
+    }
+}
+
+/// One flight of a [`Board`].
+pub struct BoardFlight<'b, L> {
+    board: &'b mut Board<L>,
+    divisor: u32,
+    next: i32,
+    reference: Reference,
+}
+
+impl<L: Line> FlightStack for BoardFlight<'_, L> {
+    fn push_setpoint(&mut self, setpoint: &Setpoint) {
+        self.board.tell("a setpoint", &Command::Setpoint(TimedSetpoint::new(self.next, setpoint)));
+        self.next += 1;
+        if self.board.outgoing.len() > QUEUE {
+            // The answer says that the queue is empty again.
+            self.board.model = None;
+            self.board.tell("who it is", &Command::Hello);
+            self.board.talk(|board| board.model.is_some());
+        }
+    }
+
+    fn next_setpoint(&self) -> i32 {
+        self.next
+    }
+
+    fn excite(&mut self, _: Vector3<f32>) {
+        // Dithered flights are for identification, which is the host's.
+    }
+
+    fn step(&mut self, tick: Tick, state: &State) -> MotorCommand {
+        let board = &mut *self.board;
+        if tick.0.is_multiple_of(self.divisor) {
+            board.tell("the position", &Command::Position(Position::new(tick, state)));
+        }
+        board.tell("the attitude", &Command::Inertial(Inertial::new(tick, state)));
+        if tick.0 == 0 {
+            board.tell("arm", &Command::Arm);
+        }
+        board.motors = None;
+        board.talk(|board| board.motors.is_some_and(|(answered, ..)| answered == tick));
+        match board.motors {
+            Some((_, command, reference)) => {
+                self.reference = Reference { yaw: self.reference.yaw, ..reference };
+                command
+            }
+            // Disarmed, or the report was lost.
+            None => MotorCommand::OFF,
+        }
+    }
+
+    fn reference(&self) -> &Reference {
+        &self.reference
+    }
+}
+
+impl<L: Line> BoardFlight<'_, L> {
+    /// What went wrong in the flight.
+    ///
+    /// # Errors
+    /// If a command was refused or the line broke.
+    pub fn check(&mut self) -> Result<(), PilError> {
+        self.board.refused()
+    }
+}

@@ -1,0 +1,103 @@
+//! Starts the emulated board with a model in its folder.
+
+use std::{
+    fs, io,
+    path::Path,
+    process::{Child, Stdio},
+    time::Duration,
+};
+
+use anyhow::{Context as _, Result};
+use clap::ValueEnum;
+use tempfile::TempDir;
+
+use super::{Board, Line, PilError, line};
+use crate::emulator;
+
+/// How long the board may take to start.
+const START: Duration = Duration::from_secs(20);
+
+/// How the firmware is reached.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum LinkKind {
+    /// The plant is a peripheral that answers at once: every run is the same.
+    #[default]
+    Lockstep,
+    /// The emulated serial port, as on the vehicle; slow, and not repeatable to the instruction.
+    Uart,
+}
+
+/// A running emulator; it ends with this value.
+pub struct Emulated {
+    child: Child,
+    folder: TempDir,
+}
+
+impl Drop for Emulated {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Emulated {
+    /// What the firmware and the emulator complained of.
+    pub fn complaints(&self) -> String {
+        fs::read_to_string(self.folder.path().join("stderr")).unwrap_or_default()
+    }
+
+    /// Waits until the firmware has ended by itself, and gives its exit code.
+    ///
+    /// # Errors
+    /// If it does not.
+    pub fn ended(&mut self) -> Result<Option<i32>> {
+        use wait_timeout::ChildExt as _;
+        let status = self.child.wait_timeout(START)?.context("the emulator does not end")?;
+        Ok(status.code())
+    }
+}
+
+/// Builds the firmware if need be, starts it with the bytes of a model file, or with none, and opens the line. `shift`: an instruction
+/// takes 2^shift nanoseconds.
+///
+/// # Errors
+/// If the target or the emulator is missing, with the line that installs it; if the firmware does not start.
+pub fn start(model: Option<&[u8]>, link: LinkKind, shift: u32) -> Result<(Emulated, Board<Box<dyn Line>>), PilError> {
+    let (emulated, line) = connect(&emulator::build_firmware("impromptu-board", "emulated", &[])?, model, link, shift)?;
+    Ok((emulated, Board::new(line, link == LinkKind::Lockstep)))
+}
+
+/// [`start`] with a binary that is built, to the line alone.
+///
+/// # Errors
+/// If the emulator is missing or the firmware does not start.
+pub fn connect(elf: &Path, model: Option<&[u8]>, link: LinkKind, shift: u32) -> Result<(Emulated, Box<dyn Line>), PilError> {
+    let folder = TempDir::new().context("cannot make a folder for the emulator")?;
+    if let Some(bytes) = model {
+        fs::write(folder.path().join("model.impromptu"), bytes).context("cannot write the model")?;
+    }
+    let socket = folder.path().join("serial");
+    let serial = match link {
+        LinkKind::Lockstep => {
+            line::make_fifos(folder.path()).context("cannot make FIFOs")?;
+            "none".to_owned()
+        }
+        LinkKind::Uart => format!("unix:{},server=on,wait=on", socket.display()),
+    };
+    let mut command = emulator::command(&format!("shift={shift},sleep=off"), &serial)?;
+    let stderr = fs::File::create(folder.path().join("stderr")).context("cannot write")?;
+    command.arg(elf).current_dir(folder.path()).stdin(Stdio::null()).stdout(Stdio::null()).stderr(stderr);
+    let child = emulator::spawn(&mut command)?;
+    let mut emulated = Emulated { child, folder };
+    let path = emulated.folder.path().to_owned();
+    let alive = || match emulated.child.try_wait()? {
+        Some(status) => Err(io::Error::other(format!("the emulator ended ({status})"))),
+        None => Ok(()),
+    };
+    let line: io::Result<Box<dyn Line>> = match link {
+        LinkKind::Lockstep => line::Lockstep::open(&path, START, alive).map(|line| Box::new(line) as _),
+        LinkKind::Uart => line::Serial::open(&socket, START, alive).map(|line| Box::new(line) as _),
+    };
+    let line = line.map_err(|error| PilError::Line(error, emulated.complaints()))?;
+    Ok((emulated, line))
+}

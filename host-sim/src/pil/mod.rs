@@ -1,0 +1,46 @@
+//! Processor in the loop: the plant here, the flight stack in the binary that is flashed.
+//!
+//! *in* flight plans; *out* the flights that the microcontroller flew, and what it measured of itself; *never* another bit than the
+//! software's, if the link is perfect; *source* ours; the link is `impromptu_firmware::link`.
+
+mod board;
+mod emulator;
+mod faults;
+mod line;
+
+pub use board::{Board, Figures};
+pub use emulator::{Emulated, LinkKind, connect, start};
+pub use faults::{Faults, Faulty};
+pub use line::{Line, Lockstep, Serial};
+
+use impromptu_firmware::link::Reason;
+
+/// Why the microcontroller does not fly.
+#[derive(Debug, thiserror::Error)]
+pub enum PilError {
+    /// The emulator or the firmware cannot be built or started.
+    #[error(transparent)]
+    Emulator(#[from] anyhow::Error),
+    /// The line to the firmware broke.
+    #[error("the line to the firmware broke: {0}; the emulator said: {1}")]
+    Line(std::io::Error, String),
+    /// The firmware did not answer.
+    #[error("the firmware did not answer {0}")]
+    Silence(&'static str),
+    /// The firmware refused a command.
+    #[error("the firmware refuses {command}: {reason}")]
+    Refused {
+        /// What it was told.
+        command: &'static str,
+        /// Why it does not obey.
+        reason: Reason,
+    },
+    /// The firmware flies another model than it was given.
+    #[error("the firmware flies model {found}, not {expected}: build it anew")]
+    Model {
+        /// Check sum that was expected.
+        expected: String,
+        /// Check sum that it names.
+        found: String,
+    },
+}
