@@ -6,6 +6,8 @@
 
 mod signals;
 
+use serde::{Deserialize, Serialize};
+
 use crate::{
     features,
     feedback::AxisState,
@@ -24,7 +26,7 @@ pub const HISTORY: usize = 16;
 const VIGOUR_LIMIT: f32 = 1e6;
 
 /// Which lanes act.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Lanes {
     /// The network lane.
     pub network: bool,

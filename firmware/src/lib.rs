@@ -35,4 +35,8 @@ pub mod quadrotor;
 
 pub mod flight;
 
+pub mod exchange;
+
+pub mod link;
+
 pub mod replay;
