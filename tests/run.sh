@@ -2,7 +2,7 @@
 # Installs what is missing, then checks and tests everything, the emulated microcontroller included.
 # Stops at the first failure and says which step it was. Needs only Rust (https://rustup.rs) on Debian or Ubuntu.
 # usage: tests/run.sh
-# IMPROMPTU_FUZZ_SECONDS: how long the decoder is fuzzed (20)
+# IMPROMPTU_FUZZ_SECONDS: how long the decoders are fuzzed, both together (20)
 set -eu
 cd "$(dirname "$0")/.."
 target=thumbv7em-none-eabihf
@@ -83,13 +83,20 @@ RUSTDOCFLAGS=-Dwarnings cargo doc --workspace --no-deps --locked
 say "tests"
 cargo test --workspace --locked --profile checked
 
-say "fuzzing the decoder for ${IMPROMPTU_FUZZ_SECONDS:=20} s"
+say "fuzzing the decoders for ${IMPROMPTU_FUZZ_SECONDS:=20} s"
 has c++ || install "g++ libc6-dev" "macOS: run xcode-select --install"
 cargo fuzz --version >/dev/null 2>&1 || cargo install --locked cargo-fuzz || fail "cargo-fuzz is missing; run: cargo install cargo-fuzz"
-# Without a sanitizer the toolchain need not be a nightly one. In safe Rust a read out of bounds is a panic, an overflow too (cargo-fuzz
-# turns the checks on).
-mkdir -p tests/fuzz/corpus/decoder
-cargo fuzz run --fuzz-dir tests/fuzz --sanitizer none decoder tests/fuzz/corpus/decoder tests/golden/models -- \
-    -max_total_time="$IMPROMPTU_FUZZ_SECONDS" -max_len=4096 -print_final_stats=1
+# Half of the time for each. Without a sanitizer the toolchain need not be a nightly one. In safe Rust a read out of bounds is a panic,
+# an overflow too (cargo-fuzz turns the checks on).
+# fuzz DECODER LENGTH SEEDS...
+fuzz() {
+    decoder=$1 length=$2
+    shift 2
+    mkdir -p "tests/fuzz/corpus/$decoder"
+    cargo fuzz run --fuzz-dir tests/fuzz --sanitizer none "$decoder" "tests/fuzz/corpus/$decoder" "$@" -- \
+        -max_total_time=$(((IMPROMPTU_FUZZ_SECONDS + 1) / 2)) -max_len="$length" -print_final_stats=1
+}
+fuzz decoder 4096 tests/golden/models
+fuzz link 1024
 
 printf '\nEverything passed.\n'

@@ -1,9 +1,11 @@
-//! What the promises need to be tested: the emulated microcontroller, its cycle model, golden texts, bytes for the decoder. The
+//! What the promises need to be tested: the emulated microcontroller, its cycle model, golden texts, bytes for the decoder and
+//! the link. The
 //! promises themselves are in `tests/`.
 
 pub mod board;
 pub mod decoder;
 pub mod golden;
+pub mod link;
 pub mod mcu;
 
 pub use impromptu_host_sim::emulator;

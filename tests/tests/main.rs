@@ -6,6 +6,7 @@
 //! - [`emulator`]: the emulator is found, fails loudly, and counts repeatably;
 //! - [`mcu`]: what kernels cost on the microcontroller, beside other engines, with a golden table;
 //! - [`kernels`]: the network kernels in assembly give the bits of their portable twin;
+//! - [`link`]: any bytes on the link are refused or messages, never a panic;
 //! - [`unsafe_code`]: there is none but those kernels, each block with its reason.
 //!
 //! The parts have tests of their own: plant against an independent simulator and every generator and parser in `host-sim`, model
@@ -16,6 +17,7 @@ mod decoder;
 mod demo;
 mod emulator;
 mod kernels;
+mod link;
 mod mcu;
 mod pil;
 mod unsafe_code;

@@ -15,7 +15,7 @@ use crate::board::model;
 
 /// The loop of the emulated flights.
 fn plant(condition: &str) -> Loop {
-    Loop::new(Vehicle::named("crazyflie").unwrap(), "lee", Condition::named(condition).unwrap()).unwrap()
+    Loop::new(Vehicle::named("crazyflie").unwrap(), "stock", Condition::named(condition).unwrap()).unwrap()
 }
 
 #[test]

@@ -33,11 +33,12 @@ fn frame_around(payload: &[u8]) -> Vec<u8> {
     seal(&mut body, payload.len(), &mut [0; FRAME]).unwrap().to_vec()
 }
 
+/// Mostly finite.
 fn number() -> impl Strategy<Value = f32> {
-    any::<f32>()
+    prop_oneof![50 => any::<f32>(), 1 => prop::num::f32::ANY]
 }
 
-/// Any command that can be delivered.
+/// Any command, if it is finite or not.
 fn any_command() -> impl Strategy<Value = Command<'static>> {
     let three = || prop::array::uniform3(number());
     prop_oneof![
@@ -58,7 +59,7 @@ fn any_command() -> impl Strategy<Value = Command<'static>> {
     ]
 }
 
-/// Sends `count` commands, each frame `line` times or changed by it, and returns what came and the counts.
+/// Sends `count` commands through `line`, which may change each frame, and returns what came and the counts.
 fn transmit(count: u32, mut line: impl FnMut(u32, Vec<u8>) -> Vec<u8>) -> (Vec<Arrival>, Counts) {
     let (mut sender, mut receiver, mut outcomes) = (Sender::new(), Receiver::<Commands>::new(), Vec::new());
     for index in 0..count {
@@ -112,9 +113,6 @@ fn flipped(frame: &[u8]) -> impl Iterator<Item = Vec<u8>> {
 fn a_frame_with_one_or_two_flipped_bits_is_refused() {
     for command in frozen::commands() {
         let good = frame(&command, 1);
-        if good.len() > 64 {
-            continue; // Settings have a million pairs.
-        }
         for bytes in flipped(&good) {
             let mut receiver = Receiver::<Commands>::new();
             let mut outcomes = feed(&mut receiver, &bytes);
@@ -198,8 +196,7 @@ fn half_frames_cost_one_frame() {
 #[test]
 fn a_flood_without_a_zero_is_one_fault() {
     let mut receiver = Receiver::<Commands>::new();
-    let outcomes = feed(&mut receiver, &[0x55; 10_000]);
-    assert_eq!(outcomes, [Err(Fault::Long)]);
+    assert_eq!(feed(&mut receiver, &[0x55; 10_000]), [Err(Fault::Long)]);
     let outcomes = feed(&mut receiver, &[vec![0], frame(&Command::Disarm, 9)].concat());
     assert!(matches!(outcomes[..], [Ok((9, ..))]));
     assert!(feed(&mut receiver, &[0; 1000]).is_empty(), "zeros alone are no frames");

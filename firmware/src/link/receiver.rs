@@ -85,6 +85,7 @@ impl<D, const N: usize> Default for Receiver<D, N> {
 
 impl<D: Direction, const N: usize> Receiver<D, N> {
     /// Takes one byte; some bytes complete a message or a fault.
+    #[inline]
     pub fn push(&mut self, byte: u8) -> Option<Result<Received<D::Message<'_>>, Fault>> {
         match self.stuffing.feed(byte) {
             Ok(DecodeResult::NoData) => None,
@@ -113,6 +114,8 @@ impl<D: Direction, const N: usize> Receiver<D, N> {
         fault
     }
 
+    // Apart from the bytes that complete nothing, which need none of its stack.
+    #[inline(never)]
     fn complete(&mut self) -> Result<Received<D::Message<'_>>, Fault> {
         let Self { body, length, youngest, counts, .. } = self;
         let received = open(body.get(..*length).unwrap_or_default()).and_then(|(sequence, bytes)| {
