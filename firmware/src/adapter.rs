@@ -109,6 +109,16 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         })
     }
 
+    /// Forgets everything but the lanes that are wanted and the counts: the next tick is the first one.
+    pub fn reset(&mut self) {
+        self.measured = History::new([EndRule::Hold; M], 0);
+        self.references = History::new([EndRule::Hold; R], i32::MIN);
+        self.ramp.clear();
+        self.axes = [AxisState::REST; MAX_AXES];
+        (self.network_weight, self.feedback_weight, self.vigour) = (0.0, 0.0, 0.0);
+        self.correction = [0.0; MAX_OUTPUTS];
+    }
+
     /// The model that is flown.
     pub fn model(&self) -> &'m Model<'m> {
         self.model

@@ -51,11 +51,22 @@ impl Voice {
     }
 }
 
+impl Default for Application<'_> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl<'m> Application<'m> {
     /// An application that has heard and said nothing.
-    pub fn new(autopilot: Autopilot<'m>) -> Self {
+    pub const fn new() -> Self {
         let voice = Voice { sender: Sender::new(), outbox: Vec::new() };
-        Self { autopilot, receiver: Receiver::new(), voice, telemetry: TELEMETRY_TICKS }
+        Self { autopilot: Autopilot::new(), receiver: Receiver::new(), voice, telemetry: TELEMETRY_TICKS }
+    }
+
+    /// The vehicle.
+    pub fn autopilot(&mut self) -> &mut Autopilot<'m> {
+        &mut self.autopilot
     }
 
     /// Takes a byte from the line. A command that concerns the flash is for a task which may wait; its outcome is for

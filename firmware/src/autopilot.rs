@@ -61,7 +61,7 @@ pub enum Reaction {
 #[derive(Debug)]
 pub struct Autopilot<'m> {
     flight: Flight<'m>,
-    settings: Settings,
+    settings: Option<Settings>,
     model: Option<Flown<'m>>,
     lanes: Lanes,
     state: State,
@@ -75,25 +75,58 @@ pub struct Autopilot<'m> {
     error_square: f32,
 }
 
+impl Default for Autopilot<'_> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl<'m> Autopilot<'m> {
-    /// A disarmed vehicle with these settings and, if there is one, this model; both lanes are off.
-    ///
-    /// # Errors
-    /// If the model does not fit the flight stack. An airframe that cannot be mixed gives `Ok(None)`.
-    pub fn new(settings: &Settings, model: Option<Flown<'m>>) -> Result<Option<Self>, Refusal> {
-        let Some(flight) = stack(settings, model)? else { return Ok(None) };
-        Ok(Some(Self {
-            flight,
-            settings: *settings,
-            model,
+    /// A vehicle that knows nothing of itself: it cannot be armed. 13 KB, so a microcontroller has it in a static.
+    pub const fn new() -> Self {
+        Self {
+            flight: Flight::parked(),
+            settings: None,
+            model: None,
             lanes: Lanes::NONE,
-            state: State::default(),
-            news: News::new(settings),
+            state: State::ORIGIN,
+            news: News::NONE,
             tick: Tick(0),
             armed: false,
-            setpoint: Setpoint::default(),
+            setpoint: Setpoint::ORIGIN,
             error_square: 0.0,
-        }))
+        }
+    }
+
+    /// Gives the vehicle the model that it shall fly with.
+    ///
+    /// # Errors
+    /// If it does not fit the flight stack; then there is none.
+    pub fn load(&mut self, model: &'m Model<'m>, slot: Option<u8>) -> Result<(), Refusal> {
+        self.model = None;
+        if let Some(settings) = &self.settings {
+            self.flight.attach(model, settings, Lanes::NONE)?;
+        }
+        self.model = Some((model, slot));
+        Ok(())
+    }
+
+    /// Gives the disarmed vehicle its settings.
+    ///
+    /// # Errors
+    /// If it is armed, if the airframe cannot be mixed, or if the model does not fit.
+    pub fn configure(&mut self, settings: &Settings) -> Result<(), Reason> {
+        if self.armed {
+            return Err(Reason::Armed);
+        }
+        if !self.flight.configure(settings) {
+            return Err(Reason::Settings);
+        }
+        (self.settings, self.news) = (Some(*settings), News::new(settings));
+        if let Some((model, _)) = self.model {
+            self.flight.attach(model, settings, Lanes::NONE).map_err(|refusal| Reason::Model((&refusal).into()))?;
+        }
+        Ok(())
     }
 
     /// Whether the motors may turn.
@@ -128,7 +161,7 @@ impl<'m> Autopilot<'m> {
             },
             // An order that was overtaken by a younger one is out of date.
             (_, Order::Late) => return Reaction::Silence,
-            (Command::Settings(settings), _) => self.set(settings),
+            (Command::Settings(settings), _) => self.configure(settings),
             (Command::Lanes(lanes), _) => self.switch(*lanes),
             (Command::Arm, _) => self.arm(),
             (Command::Disarm, _) => {
@@ -215,20 +248,6 @@ impl<'m> Autopilot<'m> {
         }
     }
 
-    fn set(&mut self, settings: &Settings) -> Result<(), Reason> {
-        if self.armed {
-            return Err(Reason::Armed);
-        }
-        match stack(settings, self.model) {
-            Ok(Some(flight)) => {
-                (self.flight, self.settings, self.news) = (flight, *settings, News::new(settings));
-                Ok(())
-            }
-            Ok(None) => Err(Reason::Settings),
-            Err(refusal) => Err(Reason::Model((&refusal).into())),
-        }
-    }
-
     fn switch(&mut self, lanes: Lanes) -> Result<(), Reason> {
         let model = self.model.map(|(model, _)| model);
         let missing = (lanes.network && model.and_then(Model::network).is_none())
@@ -244,6 +263,9 @@ impl<'m> Autopilot<'m> {
         if self.armed {
             return Err(Reason::Armed);
         }
+        if self.settings.is_none() {
+            return Err(Reason::Settings);
+        }
         if self.news.lanes_off() {
             return Err(Reason::NoState);
         }
@@ -256,10 +278,11 @@ impl<'m> Autopilot<'m> {
 
     /// Motors off. The next flight begins with a trajectory of its own, and with nothing left of this one.
     fn disarm(&mut self) {
-        (self.armed, self.news) = (false, News::new(&self.settings));
-        if let Ok(Some(flight)) = stack(&self.settings, self.model) {
-            self.flight = flight;
+        self.armed = false;
+        if let Some(settings) = &self.settings {
+            self.news = News::new(settings);
         }
+        self.flight.land();
     }
 
     /// Appends a sample of the desired trajectory, and what was lost before it.
@@ -292,15 +315,8 @@ impl<'m> Autopilot<'m> {
     /// Follows the tracking error, for the telemetry.
     fn watch(&mut self) {
         let error = self.state.position - self.flight.desired_position(Tick(self.tick.0.wrapping_sub(1)));
-        let share = 1.0 / self.settings.rates.control_hz.max(1.0);
+        let rate = self.settings.map_or(1.0, |settings| settings.rates.control_hz);
+        let share = 1.0 / rate.max(1.0);
         self.error_square += (error.norm_squared() - self.error_square) * share;
     }
-}
-
-fn stack<'m>(settings: &Settings, model: Option<Flown<'m>>) -> Result<Option<Flight<'m>>, Refusal> {
-    let Some(mut flight) = Flight::new(settings) else { return Ok(None) };
-    if let Some((model, _)) = model {
-        flight.attach(model, settings, Lanes::NONE)?;
-    }
-    Ok(Some(flight))
 }

@@ -5,6 +5,7 @@
 
 use core::num::NonZeroU32;
 
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -62,39 +63,86 @@ pub struct Settings {
 /// The adapter of the flight stack.
 pub type QuadrotorAdapter<'m> = Adapter<'m, DESIRED, MEASURED, REFERENCE>;
 
-/// The baseline loop with, if a model is given, the add-on before it.
+/// The loops of a vehicle.
 #[derive(Debug)]
-pub struct Flight<'m> {
+struct Loops {
+    settings: Settings,
     position_divisor: NonZeroU32,
-    preview: Preview<DESIRED, PREVIEW>,
-    adapter: Option<QuadrotorAdapter<'m>>,
     position: PositionLoop,
     attitude: AttitudeLoop,
     mixer: Mixer,
+}
+
+impl Loops {
+    /// `None` if the airframe cannot be mixed.
+    fn new(settings: &Settings) -> Option<Self> {
+        Some(Self {
+            settings: *settings,
+            position_divisor: NonZeroU32::new(settings.rates.position_divisor).unwrap_or(NonZeroU32::MIN),
+            position: PositionLoop::new(settings.position, settings.airframe.mass, settings.rates.reference_hz()),
+            attitude: AttitudeLoop::new(settings.attitude, settings.airframe.inertia),
+            mixer: Mixer::new(&settings.airframe)?,
+        })
+    }
+}
+
+/// The baseline loop with, if a model is given, the add-on before it.
+#[derive(Debug)]
+pub struct Flight<'m> {
+    loops: Option<Loops>,
+    preview: Preview<DESIRED, PREVIEW>,
+    adapter: Option<QuadrotorAdapter<'m>>,
     wanted: ThrustVector,
     reference: Reference,
-    excitation: nalgebra::Vector3<f32>,
+    excitation: Vector3<f32>,
     command_delay: u32,
     on_the_way: heapless::Deque<(u32, ThrustVector), COMMANDS>,
 }
 
 impl<'m> Flight<'m> {
-    /// A flight stack on the ground; `None` if the airframe cannot be mixed. The first setpoint is that of reference tick 0.
-    pub fn new(settings: &Settings) -> Option<Self> {
-        let mixer = Mixer::new(&settings.airframe)?;
-        Some(Self {
-            position_divisor: NonZeroU32::new(settings.rates.position_divisor).unwrap_or(NonZeroU32::MIN),
-            preview: Preview::new(quadrotor::end_rules(), 0),
+    /// A flight stack that knows no vehicle: its motors are off. It is 12 KB large, so a microcontroller has it in a static.
+    pub const fn parked() -> Self {
+        Self {
+            loops: None,
+            preview: Preview::new(quadrotor::END_RULES, 0),
             adapter: None,
-            position: PositionLoop::new(settings.position, settings.airframe.mass, settings.rates.reference_hz()),
-            attitude: AttitudeLoop::new(settings.attitude, settings.airframe.inertia),
-            mixer,
-            wanted: ThrustVector { force: nalgebra::Vector3::zeros(), attitude: nalgebra::Matrix3::identity() },
-            reference: Reference::default(),
-            excitation: nalgebra::Vector3::zeros(),
+            wanted: ThrustVector::NONE,
+            reference: Reference::ORIGIN,
+            excitation: Vector3::new(0.0, 0.0, 0.0),
             command_delay: 0,
             on_the_way: heapless::Deque::new(),
-        })
+        }
+    }
+
+    /// A flight stack on the ground; `None` if the airframe cannot be mixed. The first setpoint is that of reference tick 0.
+    pub fn new(settings: &Settings) -> Option<Self> {
+        let mut flight = Self::parked();
+        flight.configure(settings).then_some(flight)
+    }
+
+    /// Back on the ground with these settings, without an add-on; `false`, and nothing changes, if the airframe cannot be mixed.
+    pub fn configure(&mut self, settings: &Settings) -> bool {
+        let Some(loops) = Loops::new(settings) else { return false };
+        self.loops = Some(loops);
+        self.adapter = None;
+        self.land();
+        true
+    }
+
+    /// Back on the ground: the next setpoint is that of reference tick 0, and nothing is left of the last flight but the lanes that are
+    /// wanted and the counts.
+    pub fn land(&mut self) {
+        if let Some(loops) = &mut self.loops
+            && let Some(fresh) = Loops::new(&loops.settings)
+        {
+            *loops = fresh;
+        }
+        self.preview.clear(0);
+        if let Some(adapter) = &mut self.adapter {
+            adapter.reset();
+        }
+        (self.wanted, self.reference, self.excitation) = (ThrustVector::NONE, Reference::ORIGIN, Vector3::zeros());
+        self.on_the_way.clear();
     }
 
     /// Puts an add-on before the loop, with the lanes given.
@@ -130,14 +178,15 @@ impl<'m> Flight<'m> {
     }
 
     /// Where the vehicle is desired to be at a control tick, m, world ENU; of the position loop's last tick.
-    pub fn desired_position(&self, tick: Tick) -> nalgebra::Vector3<f32> {
-        let [x, y, z, ..] = self.preview.sample((tick.0 / self.position_divisor) as i32);
-        nalgebra::Vector3::new(x, y, z)
+    pub fn desired_position(&self, tick: Tick) -> Vector3<f32> {
+        let divisor = self.loops.as_ref().map_or(NonZeroU32::MIN, |loops| loops.position_divisor);
+        let [x, y, z, ..] = self.preview.sample((tick.0 / divisor) as i32);
+        Vector3::new(x, y, z)
     }
 
     /// Adds an offset, m, world ENU, to the position reference from the next reference tick on: the independent dither without which
     /// the closed loop cannot be identified. Zero leaves every bit as it is.
-    pub fn excite(&mut self, offset: nalgebra::Vector3<f32>) {
+    pub fn excite(&mut self, offset: Vector3<f32>) {
         self.excitation = offset;
     }
 
@@ -162,13 +211,14 @@ impl<'m> Flight<'m> {
     /// ([`Flight::deliver`]): the same bits as [`Flight::step`].
     pub fn control(&mut self, tick: Tick, state: &State) -> (MotorCommand, Option<Job>) {
         let mut job = None;
-        if tick.0.is_multiple_of(self.position_divisor.get()) {
-            let reference_tick = (tick.0 / self.position_divisor) as i32;
-            (self.reference, job) = self.adapted(reference_tick, state);
-            if self.excitation != nalgebra::Vector3::zeros() {
+        let Some(loops) = &mut self.loops else { return (MotorCommand::OFF, job) };
+        if tick.0.is_multiple_of(loops.position_divisor.get()) {
+            let reference_tick = (tick.0 / loops.position_divisor) as i32;
+            (self.reference, job) = adapted(&self.preview, &mut self.adapter, reference_tick, state);
+            if self.excitation != Vector3::zeros() {
                 self.reference.position += self.excitation;
             }
-            let wanted = self.position.step(&self.reference, state);
+            let wanted = loops.position.step(&self.reference, state);
             if tick.0 == 0 {
                 self.wanted = wanted;
             }
@@ -179,8 +229,8 @@ impl<'m> Flight<'m> {
         while let Some((_, wanted)) = self.on_the_way.pop_front_if(|(due, _)| *due <= tick.0) {
             self.wanted = wanted;
         }
-        let (thrust, moment) = self.attitude.step(&self.wanted, state);
-        (self.mixer.mix(thrust, &moment), job)
+        let (thrust, moment) = loops.attitude.step(&self.wanted, state);
+        (loops.mixer.mix(thrust, &moment), job)
     }
 
     /// Takes what came of a job of [`Flight::control`].
@@ -189,20 +239,26 @@ impl<'m> Flight<'m> {
             adapter.deliver(inference);
         }
     }
+}
 
-    fn adapted(&mut self, tick: i32, state: &State) -> (Reference, Option<Job>) {
-        let desired = self.preview.sample(tick);
-        let yaw = desired[9];
-        match &mut self.adapter {
-            Some(adapter) => {
-                let measured = quadrotor::measured(state);
-                let job = adapter.begin(tick, &self.preview, &measured);
-                (quadrotor::reference(&adapter.finish(tick, &self.preview, &measured), yaw), job)
-            }
-            None => {
-                let [px, py, pz, vx, vy, vz, ..] = desired;
-                (quadrotor::reference(&[px, py, pz, vx, vy, vz], yaw), None)
-            }
+/// The reference at a reference tick, and the network's job if there is one.
+fn adapted(
+    preview: &Preview<DESIRED, PREVIEW>,
+    adapter: &mut Option<QuadrotorAdapter<'_>>,
+    tick: i32,
+    state: &State,
+) -> (Reference, Option<Job>) {
+    let desired = preview.sample(tick);
+    let yaw = desired[9];
+    match adapter {
+        Some(adapter) => {
+            let measured = quadrotor::measured(state);
+            let job = adapter.begin(tick, preview, &measured);
+            (quadrotor::reference(&adapter.finish(tick, preview, &measured), yaw), job)
+        }
+        None => {
+            let [px, py, pz, vx, vy, vz, ..] = desired;
+            (quadrotor::reference(&[px, py, pz, vx, vy, vz], yaw), None)
         }
     }
 }

@@ -28,7 +28,7 @@ pub struct Preview<const D: usize, const N: usize> {
 
 impl<const D: usize, const N: usize> Preview<D, N> {
     /// An empty preview whose first sample will be that of tick `first`.
-    pub fn new(rules: [EndRule; D], first: i32) -> Self {
+    pub const fn new(rules: [EndRule; D], first: i32) -> Self {
         Self { samples: [[0.0; D]; N], rules, next: first, stored: 0 }
     }
 
@@ -41,6 +41,11 @@ impl<const D: usize, const N: usize> Preview<D, N> {
         }
         self.next = self.next.wrapping_add(1);
         self.stored = (self.stored + 1).min(N);
+    }
+
+    /// Forgets every sample; the next one will be that of tick `first`.
+    pub fn clear(&mut self, first: i32) {
+        (self.next, self.stored) = (first, 0);
     }
 
     /// Tick of the sample that [`Preview::push`] will store next.

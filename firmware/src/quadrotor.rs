@@ -52,9 +52,10 @@ pub fn signals() -> SignalTable<'static> {
 }
 
 /// End rules of the desired channels.
-pub fn end_rules() -> [EndRule; DESIRED] {
-    core::array::from_fn(|channel| if matches!(channel, 3..=8) { EndRule::Zero } else { EndRule::Hold })
-}
+pub const END_RULES: [EndRule; DESIRED] = {
+    let (hold, zero) = (EndRule::Hold, EndRule::Zero);
+    [hold, hold, hold, zero, zero, zero, zero, zero, zero, hold]
+};
 
 /// A setpoint as desired channels.
 pub fn desired(setpoint: &Setpoint) -> [f32; DESIRED] {
@@ -86,7 +87,6 @@ mod tests {
     fn tables_count_as_many_channels_as_the_arrays() {
         let table = signals();
         assert_eq!([table.desired.len(), table.measured.len(), table.reference.len()], [DESIRED, MEASURED, REFERENCE]);
-        let rules = end_rules();
-        assert!(table.desired.iter().zip(rules).all(|(channel, rule)| channel.end == rule));
+        assert!(table.desired.iter().zip(END_RULES).all(|(channel, rule)| channel.end == rule));
     }
 }

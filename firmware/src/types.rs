@@ -3,7 +3,7 @@
 //! *in/out* plain values in SI units, world ENU, body FLU; *never* a motor command outside 0..1 or non-finite;
 //! *source* conventions of the crate root.
 
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
 
 use crate::math::{clamp, finite_or_zero};
 
@@ -28,17 +28,20 @@ pub struct State {
 
 impl Default for State {
     fn default() -> Self {
-        Self {
-            position: Vector3::zeros(),
-            velocity: Vector3::zeros(),
-            attitude: UnitQuaternion::identity(),
-            rates: Vector3::zeros(),
-            vertical_acceleration: 0.0,
-        }
+        Self::ORIGIN
     }
 }
 
 impl State {
+    /// At rest and level in the origin.
+    pub const ORIGIN: Self = Self {
+        position: Vector3::new(0.0, 0.0, 0.0),
+        velocity: Vector3::new(0.0, 0.0, 0.0),
+        attitude: UnitQuaternion::new_unchecked(Quaternion::from_vector(Vector4::new(0.0, 0.0, 0.0, 1.0))),
+        rates: Vector3::new(0.0, 0.0, 0.0),
+        vertical_acceleration: 0.0,
+    };
+
     /// Builds a state from raw numbers; `attitude` is `[w, x, y, z]` and is normalised here.
     /// `None` if any number is not finite or the quaternion is near zero.
     pub fn from_raw(position: [f32; 3], velocity: [f32; 3], attitude: [f32; 4], rates: [f32; 3]) -> Option<Self> {
@@ -70,6 +73,14 @@ pub struct Setpoint {
     pub yaw: f32,
 }
 
+impl Setpoint {
+    /// At rest in the origin.
+    pub const ORIGIN: Self = {
+        let zero = Vector3::new(0.0, 0.0, 0.0);
+        Self { position: zero, velocity: zero, acceleration: zero, yaw: 0.0 }
+    };
+}
+
 /// What the baseline loop tracks: the desired state, corrected.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reference {
@@ -79,6 +90,11 @@ pub struct Reference {
     pub velocity: Vector3<f32>,
     /// Yaw, rad.
     pub yaw: f32,
+}
+
+impl Reference {
+    /// At rest in the origin.
+    pub const ORIGIN: Self = Self { position: Vector3::new(0.0, 0.0, 0.0), velocity: Vector3::new(0.0, 0.0, 0.0), yaw: 0.0 };
 }
 
 /// Rotor speeds as fractions of the largest speed: always finite, always in 0..=1.

@@ -21,7 +21,7 @@ fn plant(condition: &str) -> Loop {
 #[test]
 fn flights_through_the_firmware_have_every_bit_of_the_software() {
     let plant = plant("lab");
-    let file = model::file(&model::RELU, Precision::Int8);
+    let file = model::file(&model::TANH, Precision::Int8);
     let model = Model::from_bytes(&file).unwrap();
     let trajectories = strokes(1, 2, 1.0, plant.rate_hz()).unwrap();
     let (_emulated, mut board) = pil::start(Some(&file), LinkKind::Lockstep, 3).unwrap();

@@ -61,6 +61,12 @@ pub(super) struct News {
 }
 
 impl News {
+    /// Nothing was ever heard, and no patience.
+    pub(super) const NONE: Self = {
+        let source = Source { stamp: None, age: u32::MAX, lanes: 0, motors: 0 };
+        Self { inertial: source, position: source }
+    };
+
     pub(super) fn new(settings: &Settings) -> Self {
         let patience = Patience::default();
         let rate = settings.rates.control_hz;

@@ -31,6 +31,12 @@ pub struct ThrustVector {
     pub attitude: Matrix3<f32>,
 }
 
+impl ThrustVector {
+    /// No force, no rotation.
+    pub const NONE: Self =
+        Self { force: Vector3::new(0.0, 0.0, 0.0), attitude: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0) };
+}
+
 /// Position loop with its integral.
 #[derive(Clone, Debug)]
 pub struct PositionLoop {

@@ -90,10 +90,38 @@ impl Lockstep {
                 Err(error) => return Err(error),
             }
         };
-        for file in [&to_firmware, &from_firmware] {
+        let mut line = Self { to_firmware, from_firmware };
+        // A first, empty batch: its answer tells that the firmware has opened the other FIFO too.
+        line.to_firmware.write_all(&[0; 4])?;
+        let mut first = [0];
+        loop {
+            match line.from_firmware.read(&mut first) {
+                Ok(1) => break,
+                // Nobody writes yet, or not yet anything.
+                Ok(_) => {}
+                Err(error) if error.kind() == ErrorKind::WouldBlock => {}
+                Err(error) => return Err(error),
+            }
+            alive()?;
+            if start.elapsed() > patience {
+                return Err(ErrorKind::TimedOut.into());
+            }
+            thread::sleep(Duration::from_millis(1));
+        }
+        for file in [&line.to_firmware, &line.from_firmware] {
             fcntl_setfl(file, OFlags::empty())?;
         }
-        Ok(Self { to_firmware, from_firmware })
+        let [second, third, fourth] = line.take()?;
+        let rest = u32::from_le_bytes([first[0], second, third, fourth]);
+        let mut answer = vec![0; rest as usize];
+        line.from_firmware.read_exact(&mut answer)?;
+        Ok(line)
+    }
+
+    fn take<const N: usize>(&mut self) -> io::Result<[u8; N]> {
+        let mut bytes = [0; N];
+        self.from_firmware.read_exact(&mut bytes)?;
+        Ok(bytes)
     }
 }
 
@@ -102,9 +130,7 @@ impl Line for Lockstep {
         let mut batch = (bytes.len() as u32).to_le_bytes().to_vec();
         batch.extend(bytes);
         self.to_firmware.write_all(&batch)?;
-        let mut length = [0; 4];
-        self.from_firmware.read_exact(&mut length)?;
-        let mut answer = vec![0; u32::from_le_bytes(length) as usize];
+        let mut answer = vec![0; u32::from_le_bytes(self.take()?) as usize];
         self.from_firmware.read_exact(&mut answer)?;
         Ok(answer)
     }

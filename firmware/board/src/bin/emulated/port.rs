@@ -24,10 +24,10 @@ pub(crate) struct Lockstep {
 }
 
 impl Lockstep {
-    /// Opens both FIFOs, if they are there. The host opens them in the same order.
+    /// Opens both FIFOs, if they are there; waits until the host has opened the first for writing.
     pub(crate) fn open() -> Option<Self> {
-        let to_host = File::options().write(true).open(c"from_firmware").ok()?;
         let from_host = File::open(c"to_firmware").ok()?;
+        let to_host = File::create(c"from_firmware").ok()?;
         Some(Self { from_host, to_host })
     }
 

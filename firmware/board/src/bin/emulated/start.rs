@@ -3,7 +3,6 @@
 use impromptu_board::CRAZYFLIE;
 use impromptu_firmware::{
     application::Application,
-    autopilot::Autopilot,
     model::{Model, Place},
     network::Network,
 };
@@ -12,29 +11,36 @@ use semihosting::{
     io::{self, Read, Write},
     process,
 };
-use static_cell::StaticCell;
+use static_cell::{ConstStaticCell, StaticCell};
 
 /// Most bytes of a model file: what an int8 network of four layers of 128 units has, and as much again.
 const MODEL_BYTES: usize = 72 * 1024;
 
 /// The application, and the network for its own task.
 pub(crate) fn application() -> (&'static mut Application<'static>, Option<&'static Network<'static>>) {
-    static APPLICATION: StaticCell<Application<'static>> = StaticCell::new();
+    static APPLICATION: ConstStaticCell<Application<'static>> = ConstStaticCell::new(Application::new());
     let model = model();
-    match Autopilot::new(&CRAZYFLIE, model.map(|model| (model, None))) {
-        Ok(Some(autopilot)) => (APPLICATION.init_with(|| Application::new(autopilot)), model.and_then(Model::network)),
-        Ok(None) => fail("the airframe cannot be mixed"),
-        Err(_) => fail("model.impromptu is not for this flight stack; `inspect` it"),
+    let application = APPLICATION.take();
+    let autopilot = application.autopilot();
+    if autopilot.configure(&CRAZYFLIE).is_err() {
+        fail("the airframe cannot be mixed");
     }
+    if let Some(model) = model
+        && autopilot.load(model, None).is_err()
+    {
+        fail("model.impromptu is not for this flight stack; `inspect` it");
+    }
+    (application, model.and_then(Model::network))
 }
 
 /// The model of the emulator's folder.
 #[inline(never)]
 fn model() -> Option<&'static Model<'static>> {
-    static IMPROMPTU_WEIGHTS: StaticCell<Place<MODEL_BYTES>> = StaticCell::new();
+    // Made in place: on the stack there is no room for it.
+    static IMPROMPTU_WEIGHTS: ConstStaticCell<Place<MODEL_BYTES>> = ConstStaticCell::new(Place::new());
     static MODEL: StaticCell<Model<'static>> = StaticCell::new();
     let mut file = File::open(c"model.impromptu").ok()?;
-    let place = IMPROMPTU_WEIGHTS.init_with(Place::new);
+    let place = IMPROMPTU_WEIGHTS.take();
     let held = place.fill(|bytes| {
         let mut length = 0;
         while let Some(rest) = bytes.get_mut(length..).filter(|rest| !rest.is_empty()) {
