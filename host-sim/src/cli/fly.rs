@@ -11,13 +11,16 @@ use super::{
     Session,
     model_file::{ModelFile, method},
     output::{number, table},
+    processor::Flights,
     situation::{Situation, milliseconds, speed},
     trajectory,
 };
 use crate::{
     experiment::{Purpose, per_flight},
+    pil::LinkKind,
     report::{Method, PerFlight},
     rollout::{FlightPlan, FlightRecord},
+    trajectory::strokes,
 };
 
 /// Arguments of `fly`.
@@ -29,14 +32,15 @@ flies alone. The log has the columns that `train --help` lists, and the true pos
 Examples:
   host-sim fly --trajectory figure8
   host-sim fly --model models/model.impromptu --trajectory letters:HI --speed 1.7 --log hi.csv
-  host-sim fly --model models/model.impromptu --trajectory own.csv --condition rough --extra-delay-ms 20 --lanes network")]
+  host-sim fly --model models/model.impromptu --trajectory own.csv --condition rough --extra-delay-ms 20 --lanes network
+  host-sim fly --pil --model models/model.impromptu")]
 pub(super) struct Fly {
     /// Model file; without it the baseline flies alone.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Name (see `trajectory --list`) or CSV file of the trajectory.
-    #[arg(long, value_name = "NAME|FILE.csv")]
-    trajectory: String,
+    /// Name (see `trajectory --list`) or CSV file of the trajectory; not needed with --pil, which flies unseen strokes.
+    #[arg(long, value_name = "NAME|FILE.csv", required_unless_present = "pil")]
+    trajectory: Option<String>,
     #[command(flatten)]
     situation: Situation,
     /// Factor on the speed.
@@ -48,8 +52,17 @@ pub(super) struct Fly {
     /// Lanes of the model that are on.
     #[arg(long, value_enum, default_value_t, requires = "model")]
     lanes: LaneChoice,
+    /// Flies through the firmware on the emulated microcontroller, which it builds.
+    #[arg(long)]
+    pil: bool,
+    /// With --pil: how the firmware is reached.
+    #[arg(long, value_enum, default_value_t, requires = "pil")]
+    link: LinkKind,
+    /// With --pil and without --trajectory: number of strokes.
+    #[arg(long, value_name = "N", default_value = "30", requires = "pil", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    strokes: u32,
     /// CSV file for the log of the last flight: the add-on's, or the baseline's without --model.
-    #[arg(long, value_name = "OUT.csv")]
+    #[arg(long, value_name = "OUT.csv", conflicts_with = "pil")]
     log: Option<PathBuf>,
 }
 
@@ -84,7 +97,10 @@ struct Flown {
 impl Fly {
     pub(super) fn run(self, session: &Session) -> Result<()> {
         let plant = self.situation.plant()?.delayed(self.extra_delay_ms / 1e3);
-        let trajectory = trajectory::find(&self.trajectory)?.scaled(self.speed).sampled(plant.rate_hz())?;
+        let trajectory = match &self.trajectory {
+            Some(name) => Some(trajectory::find(name)?.scaled(self.speed).sampled(plant.rate_hz())?),
+            None => None,
+        };
         let file = self.model.as_deref().map(ModelFile::read).transpose()?;
         let model = file.as_ref().map(ModelFile::model).transpose()?;
         if let (Some(model), Some(file)) = (&model, &file)
@@ -101,6 +117,15 @@ impl Fly {
             }
             session.console.note(&format!("{}: has no feedback lane, its network flies alone", file.name()));
         }
+        if self.pil {
+            let strokes =
+                || strokes(session.configuration.seed_of(Purpose::Test), self.strokes as usize, self.speed, plant.rate_hz());
+            let trajectories = trajectory.map_or_else(strokes, |trajectory| Ok(vec![trajectory]))?;
+            let (speed, lanes, link) = (self.speed, self.lanes.lanes(), self.link);
+            let flights = Flights { plant: &plant, trajectories: &trajectories, speed, file: file.as_ref(), lanes, link };
+            return flights.run(session);
+        }
+        let Some(trajectory) = trajectory else { bail!("--trajectory is missing") };
         let seed = session.configuration.seed();
         let flight_seed = session.configuration.seed_of(Purpose::Test);
         session.console.note(&format!("seed {seed}"));
@@ -113,7 +138,7 @@ impl Fly {
             methods.push(method(model, lanes));
         }
         let records =
-            plant.fly(&plans).with_context(|| file.as_ref().map_or_else(|| self.trajectory.clone(), ModelFile::name))?;
+            plant.fly(&plans).with_context(|| file.as_ref().map_or_else(|| trajectory.name.clone(), ModelFile::name))?;
         if let Some(path) = &self.log {
             write_log(&records, path)?;
             session.console.note(&format!("log: {}", path.display()));

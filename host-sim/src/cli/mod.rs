@@ -10,6 +10,7 @@ mod evaluate;
 mod fly;
 mod model_file;
 mod output;
+mod processor;
 mod progress;
 mod report;
 mod situation;

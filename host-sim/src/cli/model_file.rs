@@ -29,6 +29,11 @@ impl ModelFile {
         self.path.display().to_string()
     }
 
+    /// The file's bytes.
+    pub(super) fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
     /// The model, checked as the firmware checks it.
     pub(super) fn model(&self) -> Result<Model<'_>> {
         Model::from_bytes(&self.bytes).with_context(|| format!("{}: refused", self.name()))

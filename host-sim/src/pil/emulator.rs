@@ -2,7 +2,7 @@
 
 use std::{
     fs, io,
-    path::Path,
+    path::{Path, PathBuf},
     process::{Child, Stdio},
     time::Duration,
 };
@@ -57,13 +57,21 @@ impl Emulated {
     }
 }
 
+/// Builds the firmware of the emulated board, if it is not built; the ELF file.
+///
+/// # Errors
+/// If the target is missing, with the line that installs it, or the build fails.
+pub fn firmware() -> Result<PathBuf> {
+    emulator::build_firmware("impromptu-board", "emulated", &[])
+}
+
 /// Builds the firmware if need be, starts it with the bytes of a model file, or with none, and opens the line. `shift`: an instruction
 /// takes 2^shift nanoseconds.
 ///
 /// # Errors
 /// If the target or the emulator is missing, with the line that installs it; if the firmware does not start.
 pub fn start(model: Option<&[u8]>, link: LinkKind, shift: u32) -> Result<(Emulated, Board<Box<dyn Line>>), PilError> {
-    let (emulated, line) = connect(&emulator::build_firmware("impromptu-board", "emulated", &[])?, model, link, shift)?;
+    let (emulated, line) = connect(&firmware()?, model, link, shift)?;
     Ok((emulated, Board::new(line, link == LinkKind::Lockstep)))
 }
 

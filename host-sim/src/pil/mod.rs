@@ -6,11 +6,13 @@
 mod board;
 mod emulator;
 mod faults;
+mod flights;
 mod line;
 
 pub use board::{Board, Figures};
-pub use emulator::{Emulated, LinkKind, connect, start};
+pub use emulator::{Emulated, LinkKind, connect, firmware, start};
 pub use faults::{Faults, Faulty};
+pub use flights::{CYCLES_PER_INSTRUCTION, PilReport, fly};
 pub use line::{Line, Lockstep, Serial};
 
 use impromptu_firmware::link::Reason;
@@ -21,6 +23,9 @@ pub enum PilError {
     /// The emulator or the firmware cannot be built or started.
     #[error(transparent)]
     Emulator(#[from] anyhow::Error),
+    /// The flights cannot be flown, by the firmware or at all.
+    #[error(transparent)]
+    Rollout(#[from] crate::rollout::RolloutError),
     /// The line to the firmware broke.
     #[error("the line to the firmware broke: {0}; the emulator said: {1}")]
     Line(std::io::Error, String),

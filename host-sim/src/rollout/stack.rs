@@ -27,6 +27,28 @@ pub trait FlightStack {
     fn reference(&self) -> &Reference;
 }
 
+impl<S: FlightStack> FlightStack for &mut S {
+    fn push_setpoint(&mut self, setpoint: &Setpoint) {
+        S::push_setpoint(self, setpoint);
+    }
+
+    fn next_setpoint(&self) -> i32 {
+        S::next_setpoint(self)
+    }
+
+    fn excite(&mut self, offset: Vector3<f32>) {
+        S::excite(self, offset);
+    }
+
+    fn step(&mut self, tick: Tick, state: &State) -> MotorCommand {
+        S::step(self, tick, state)
+    }
+
+    fn reference(&self) -> &Reference {
+        S::reference(self)
+    }
+}
+
 /// The flight stack in this program.
 pub(super) struct Software<'a> {
     flight: Flight<'a>,

@@ -101,6 +101,7 @@ mod app {
     fn control(mut cx: control::Context) {
         let control::LocalResources { application, lockstep, meters, counter, .. } = cx.local;
         let mut cost = 0;
+        let flying = application.autopilot().armed();
         let mut hear = |bytes: &[u8]| {
             let ((), instructions) = counter.measure(|| {
                 for byte in bytes {
@@ -138,7 +139,10 @@ mod app {
                 rtic::pend(Interrupt::DCMI);
             }
             cost += instructions;
-            meters.control_max = meters.control_max.max(cost);
+            // Before and after a flight, trajectories and settings are uploaded in a tick.
+            if flying && application.autopilot().armed() {
+                meters.control_max = meters.control_max.max(cost);
+            }
             meters.inference_max = INFERENCE_MAX.load(Ordering::Relaxed);
             meters.stack_bytes = STACK.load(Ordering::Relaxed);
         }

@@ -1,0 +1,119 @@
+//! `host-sim fly --pil`: flights through the firmware on the emulated microcontroller.
+
+use anyhow::{Context as _, Result, bail};
+use impromptu_firmware::adapter::Lanes;
+use serde::Serialize;
+
+use super::{
+    Session,
+    model_file::{ModelFile, method},
+    output::{number, table},
+};
+use crate::{
+    experiment::{Loop, Purpose, demo::Observer as _, per_flight},
+    pil::{self, LinkKind, PilReport},
+    report::{Method, PerFlight, Row, summarise},
+    rollout::FlightPlan,
+    trajectory::Trajectory,
+};
+
+/// Nanoseconds of an instruction as a power of two: 125 million instructions a second, about what 168 MHz give.
+const SHIFT: u32 = 3;
+
+/// What is flown through the firmware.
+pub(super) struct Flights<'a> {
+    pub(super) plant: &'a Loop,
+    pub(super) trajectories: &'a [Trajectory],
+    pub(super) speed: f64,
+    pub(super) file: Option<&'a ModelFile>,
+    pub(super) lanes: Lanes,
+    pub(super) link: LinkKind,
+}
+
+/// What is printed as JSON.
+#[derive(Debug, Serialize)]
+struct Flown {
+    seed: u64,
+    strokes: usize,
+    model: Option<String>,
+    link: String,
+    table: Vec<Row>,
+    pil: PilReport,
+}
+
+impl Flights<'_> {
+    /// Flies the baseline and, if there is one, the model over the trajectories, and prints the same table as the software would.
+    pub(super) fn run(&self, session: &Session) -> Result<()> {
+        if self.plant.condition.command_delay_s > 0.0 {
+            bail!("--pil: the firmware has no further delay to offer; leave out --extra-delay-ms");
+        }
+        let (seed, flight_seed) = (session.configuration.seed(), session.configuration.seed_of(Purpose::Test));
+        session.console.note(&format!("seed {seed}; building the firmware"));
+        let model = self.file.map(ModelFile::model).transpose()?;
+        let (_emulated, mut board) = pil::start(self.file.map(ModelFile::bytes), self.link, SHIFT)?;
+        let (flies, wanted) = (board.introduce()?, model.as_ref().map(|model| model.checksum()));
+        if flies != wanted {
+            bail!("the firmware flies another model ({flies:08x?}) than it was given ({wanted:08x?})");
+        }
+        let seeds = || self.trajectories.iter().zip(flight_seed..);
+        let mut plans: Vec<FlightPlan<'_>> = seeds().map(|(trajectory, seed)| FlightPlan::new(trajectory, seed)).collect();
+        let flights = plans.len();
+        if let Some(model) = &model {
+            plans.extend(seeds().map(|(trajectory, seed)| FlightPlan::new(trajectory, seed).with(model, self.lanes)));
+        }
+        let of = plans.len() as u64;
+        let flown = |done: usize| session.console.steps(done as u64, of);
+        let (records, pil) = pil::fly(&mut board, self.plant, &plans, flown).context("--pil")?;
+        board.end();
+        session.console.finish();
+        let errors: Vec<f64> = records.iter().map(|record| record.rms).collect();
+        let (baseline, with_model) = errors.split_at(flights);
+        let scored = |method, errors: &[f64]| -> Vec<PerFlight> {
+            per_flight(self.plant, self.trajectories, self.speed, method, errors, baseline, seed)
+        };
+        let mut per_flight = scored(Method::Baseline, baseline);
+        if let Some(model) = &model {
+            per_flight.extend(scored(method(model, self.lanes), with_model));
+        }
+        let flown = Flown {
+            seed,
+            strokes: flights,
+            model: self.file.map(ModelFile::name),
+            link: format!("{:?}", self.link).to_lowercase(),
+            table: summarise(&per_flight),
+            pil,
+        };
+        session.format.print(&flown, || text(&flown))
+    }
+}
+
+fn text(flown: &Flown) -> String {
+    let rows = flown.table.iter().map(|row| {
+        let reduction = |value| if row.method == Method::Baseline { String::new() } else { number(value, 1) };
+        [
+            format!("{} {} {}", row.vehicle, row.gains, row.condition),
+            row.method.name().to_owned(),
+            format!("{}x", row.speed),
+            number(row.rms_cm_mean, 3),
+            reduction(row.reduction_mean),
+            reduction(row.reduction_worst),
+        ]
+    });
+    let flights = table(["flown by the firmware", "method", "speed", "RMS error, cm", "mean, %", "worst, %"], 2, rows);
+    let PilReport { bit_identical, ticks, figures, cpu_share, cpu_share_1khz } = &flown.pil;
+    let bits = if *bit_identical { "every bit is the software's" } else { "NOT the software's bits" };
+    let share = |share: &f64| format!("{} %", number(100.0 * share, 1));
+    let figures = [
+        ("control ticks", format!("{ticks}, {bits}")),
+        ("control task, worst", format!("{} instructions", figures.control_instructions_max)),
+        ("inference, worst", format!("{} instructions", figures.inference_instructions_max)),
+        ("tick to control task, worst", format!("{} instructions", figures.entry_instructions_max)),
+        ("deadlines missed", figures.deadline_misses.to_string()),
+        ("late inferences", figures.late_inferences.to_string()),
+        ("processor at 168 MHz, every tick as the worst", format!("{} (1 kHz: {})", share(cpu_share), share(cpu_share_1khz))),
+        ("stack, deepest", format!("{} B", figures.stack_bytes)),
+        ("frames dropped", figures.dropped.to_string()),
+    ];
+    let figures = table(["microcontroller", ""], 1, figures.map(|(name, value)| [name.to_owned(), value]));
+    format!("{} flights, seed {}, link {}\n{flights}{figures}", flown.strokes, flown.seed, flown.link)
+}
