@@ -14,6 +14,7 @@
 mod board;
 mod decoder;
 mod demo;
+mod elf;
 mod emulator;
 mod kernels;
 mod mcu;
