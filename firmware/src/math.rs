@@ -9,14 +9,15 @@ pub fn sqrt(x: f32) -> f32 {
     libm::sqrtf(x)
 }
 
-/// Sine of an angle in rad.
-#[inline]
+/// Sine of an angle in rad. Calculates in f64, which the microcontroller does in software; a function of its own, so that a binary shows
+/// where that is reached from.
+#[inline(never)]
 pub fn sin(x: f32) -> f32 {
     libm::sinf(x)
 }
 
-/// Cosine of an angle in rad.
-#[inline]
+/// Cosine of an angle in rad, like [`sin`].
+#[inline(never)]
 pub fn cos(x: f32) -> f32 {
     libm::cosf(x)
 }

@@ -10,7 +10,7 @@ use std::{
 
 use super::{
     Elf,
-    instruction::{Flow, Stack},
+    instruction::{Condition, Flow, Instruction, Stack},
 };
 
 /// Deepest stack that is still followed: all memory of the microcontroller. A loop that pushes gets there.
@@ -55,8 +55,41 @@ pub struct Function {
     pub flaws: BTreeSet<Flaw>,
 }
 
-/// A point of the walk: where, how deep, and how many instructions from here on are conditional.
-type Point = (u32, i32, u8);
+/// The rest of an IT block.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+struct Block {
+    rest: Condition,
+    /// Whether the condition of the first instruction holds; unknown when the flags were written since.
+    holds: Option<bool>,
+}
+
+impl Block {
+    /// Whether the instruction at hand is executed, if that is known.
+    fn executes(self) -> Option<bool> {
+        if self.rest.count == 0 { Some(true) } else { self.holds.map(|holds| holds == (self.rest.alike & 1 != 0)) }
+    }
+
+    /// The block after the instruction at hand. Right behind its end the condition is still known: a long conditional stretch is made of
+    /// several blocks.
+    fn after(self, instruction: &Instruction) -> Self {
+        if self.rest.count == 0 {
+            return Self::default();
+        }
+        let rest = Condition { count: self.rest.count - 1, alike: self.rest.alike >> 1, ..self.rest };
+        Self { rest, holds: self.holds.filter(|_| !instruction.flags) }
+    }
+
+    /// What may be known of the condition of a block that starts at hand.
+    fn outcomes(self, rest: Condition) -> Vec<bool> {
+        match self.holds {
+            Some(holds) if self.rest.code >> 1 == rest.code >> 1 => vec![holds == (self.rest.code == rest.code)],
+            _ => vec![true, false],
+        }
+    }
+}
+
+/// A point of the walk: where, how deep, and what is conditional from here on.
+type Point = (u32, i32, Block);
 
 /// A walk in progress.
 struct Walk<'a> {
@@ -73,7 +106,7 @@ struct Walk<'a> {
 pub fn walk(image: &Elf, entry: u32, endless: &BTreeSet<u32>) -> Function {
     let (start, end) = image.function(entry).map_or((entry, entry), |(start, symbol)| (start, symbol.end));
     let mut walk = Walk { image, start, end, endless, found: Function::default(), seen: BTreeSet::new(), open: Vec::new() };
-    walk.visit((entry, 0, 0));
+    walk.visit((entry, 0, Block::default()));
     while let Some(point) = walk.open.pop() {
         walk.step(point);
     }
@@ -93,9 +126,9 @@ impl Walk<'_> {
     }
 
     /// Goes on at an address: within the function, or for good to another one, which returns in this one's place.
-    fn go(&mut self, (address, depth, conditional): Point) {
+    fn go(&mut self, (address, depth, block): Point) {
         if (self.start..self.end).contains(&address) {
-            return self.visit((address, depth, conditional));
+            return self.visit((address, depth, block));
         }
         self.call(address, depth);
         if !self.endless.contains(&address) {
@@ -115,13 +148,19 @@ impl Walk<'_> {
         *deepest = depth.cast_unsigned().max(*deepest);
     }
 
-    fn step(&mut self, (address, depth, conditional): Point) {
+    fn step(&mut self, (address, depth, block): Point) {
         let Ok(instruction) = self.image.instruction(address) else {
             self.found.flaws.insert(Flaw::NoCode(address));
             return;
         };
         let next = address + instruction.length;
-        let left = conditional.saturating_sub(1);
+        let left = block.after(&instruction);
+        if block.executes() != Some(true) {
+            self.go((next, depth, left));
+        }
+        if block.executes() == Some(false) {
+            return;
+        }
         let after = match instruction.stack {
             Stack::Same => depth,
             Stack::Down(bytes) => depth.saturating_add(bytes),
@@ -135,42 +174,53 @@ impl Walk<'_> {
             return;
         }
         self.found.frame = self.found.frame.max(after.cast_unsigned());
-        // A conditional instruction may also do nothing, which matters if it does something.
-        if conditional > 0 && (instruction.stack != Stack::Same || instruction.flow != Flow::Next) {
-            self.go((next, depth, left));
-        }
+        let here = (next, after, left);
+        let there = |target| (target, after, Block::default());
         match instruction.flow {
-            Flow::Next => self.go((next, after, left)),
-            Flow::Conditional(count) => self.go((next, after, count)),
-            Flow::Jump(target) => self.go((target, after, 0)),
+            Flow::Next => self.go(here),
+            Flow::Conditional(rest) => {
+                for holds in block.outcomes(rest) {
+                    self.go((next, after, Block { rest, holds: Some(holds) }));
+                }
+            }
+            Flow::Jump(target) => self.go(there(target)),
             Flow::Branch(target) => {
-                self.go((target, after, 0));
-                self.go((next, after, left));
+                self.go(there(target));
+                self.go(here);
             }
             Flow::Call(target) => {
                 self.call(target, after);
-                self.come_back(!self.endless.contains(&target), (next, after, left));
+                self.come_back(!self.endless.contains(&target), here);
             }
             Flow::CallRegister => {
                 self.indirect(address, after);
-                self.come_back(true, (next, after, left));
+                self.come_back(true, here);
             }
             Flow::JumpRegister => match self.veneer(address) {
-                Some(target) => self.go((target, after, 0)),
-                None => {
-                    self.indirect(address, after);
-                    self.leave(address, after);
-                }
+                Some(target) => self.go(there(target)),
+                None => self.jump(address, after),
             },
+            // With something left on the stack the link register holds the address of a label.
+            Flow::Return if instruction.stack == Stack::Same && after != 0 => self.jump(address, after),
+            Flow::Return => self.leave(address, after),
             Flow::JumpLiteral(at) => match self.image.bytes(at) {
-                Some(bytes) => self.go((u32::from_le_bytes(bytes) & !1, after, 0)),
+                Some(bytes) => self.go(there(u32::from_le_bytes(bytes) & !1)),
                 None => drop(self.found.flaws.insert(Flaw::NoCode(address))),
             },
-            Flow::Return => self.leave(address, after),
             Flow::Table { at, wide } => self.table(at, wide, after),
             Flow::Trap => {}
             Flow::Unknown => drop(self.found.flaws.insert(Flaw::NoCode(address))),
         }
+    }
+
+    /// Follows a jump to an address in a register: to every label in the function's tables, if it was said to stay within.
+    fn jump(&mut self, address: u32, depth: i32) {
+        let labels = self.image.labels(self.start, self.end);
+        if labels.is_empty() {
+            self.indirect(address, depth);
+            return self.leave(address, depth);
+        }
+        labels.into_iter().for_each(|label| self.visit((label, depth, Block::default())));
     }
 
     /// The point behind a call. The compiler puts nothing behind one that never returns: there the function may end, or a literal lie.
@@ -196,29 +246,46 @@ impl Walk<'_> {
     fn table(&mut self, at: u32, wide: bool, depth: i32) {
         let mut end = self.image.end_of_data(at).unwrap_or(at).min(self.end);
         let mut entry = at;
-        let mut any = false;
         while entry < end {
             let offset = match (wide, self.image.bytes::<2>(entry)) {
                 (_, None) => break,
-                (true, Some(bytes)) => u32::from(u16::from_le_bytes(bytes)),
-                (false, Some([byte, _])) => u32::from(byte),
+                (true, Some(bytes)) => u16::from_le_bytes(bytes),
+                (false, Some([byte, _])) => u16::from(byte),
             };
-            entry += if wide { 2 } else { 1 };
-            let target = at + 2 * offset;
-            // The byte that fills up an odd table.
-            if !wide && offset == 0 && entry == end {
+            let target = at + 2 * u32::from(offset);
+            let leaves = !(self.start..self.end).contains(&target) || !self.image.is_code(target);
+            // What fills a table up to the next word is no entry: zeros and NOPs, which as entries would lead nowhere, or what the
+            // compiler fills with, if the check before the jump says so.
+            let fills = match (wide, offset) {
+                (true, 0 | 0xbf00 | 0xd4d4) | (false, 0) => leaves,
+                (false, 0xd4) => self.has_check(at, entry - at),
+                _ => false,
+            };
+            if fills && end - entry < 4 {
                 break;
             }
-            if !(self.start..self.end).contains(&target) || !self.image.is_code(target) {
+            entry += if wide { 2 } else { 1 };
+            if leaves {
                 self.found.flaws.insert(Flaw::Table(at));
-                continue;
+                return;
             }
-            any = true;
-            end = end.min(target.max(at));
-            self.visit((target, depth, 0));
+            end = end.min(target);
+            self.visit((target, depth, Block::default()));
         }
-        if !any {
+        if entry == at {
             self.found.flaws.insert(Flaw::Table(at));
         }
+    }
+
+    /// Whether shortly before the table at `at` some register is compared with the number of the last of `entries`.
+    fn has_check(&self, at: u32, entries: u32) -> bool {
+        let halves = |address: u32| {
+            self.image.bytes::<4>(address).map_or((0, 0), |[a, b, c, d]| (u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d])))
+        };
+        (at.saturating_sub(48).max(self.start)..at).step_by(2).map(halves).any(|(first, second)| {
+            let narrow = first >> 11 == 0b00101 && u32::from(first & 0xff) + 1 == entries;
+            let wide = first & 0xfff0 == 0xf1b0 && second >> 8 == 0x0f && u32::from(second & 0xff) + 1 == entries;
+            narrow || wide
+        })
     }
 }

@@ -104,12 +104,22 @@ impl<'a> CallGraph<'a> {
     /// # Errors
     /// If a root is not there.
     pub fn from_roots(&self, roots: &[&str]) -> Result<Proof<'_>> {
+        self.from_roots_except(roots, &[])
+    }
+
+    /// [`CallGraph::from_roots`], without what is called by the functions with `exceptions` in their names: what those reach is to be
+    /// told apart. They have no stack then, so [`Proof::stack_bytes`] is no bound.
+    ///
+    /// # Errors
+    /// If a root or an exception is not there.
+    pub fn from_roots_except(&self, roots: &[&str], exceptions: &[&str]) -> Result<Proof<'_>> {
+        let exceptions = exceptions.iter().map(|name| self.entries(name)).collect::<Result<Vec<_>>>()?.concat();
         let roots = roots.iter().map(|root| self.entries(root)).collect::<Result<Vec<_>>>()?.concat();
         // Breadth first: the chain of callers that is shown is a shortest one.
         let mut callers: BTreeMap<u32, Option<u32>> = roots.iter().map(|root| (*root, None)).collect();
         let mut open: VecDeque<u32> = roots.iter().copied().collect();
         while let Some(entry) = open.pop_front() {
-            for target in self.calls(entry).into_keys() {
+            for target in self.calls(entry).into_keys().filter(|target| !exceptions.contains(target)) {
                 callers.entry(target).or_insert_with(|| {
                     open.push_back(target);
                     Some(entry)

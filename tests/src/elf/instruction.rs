@@ -36,12 +36,24 @@ pub enum Flow {
         /// Whether the entries are halfwords.
         wide: bool,
     },
-    /// At the next instruction; as many instructions from there on are conditional.
-    Conditional(u8),
+    /// At the next instruction; from there on, as many instructions as this is long are conditional: true, if on the same condition
+    /// as the first of them, false, if on the opposite one.
+    Conditional(Condition),
     /// Nowhere: a permanently undefined instruction.
     Trap,
     /// Nowhere on this core: no instruction of it.
     Unknown,
+}
+
+/// The instructions of an IT block that are still to come.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Condition {
+    /// Number of the first one's condition; the lowest bit turns it into its opposite.
+    pub code: u8,
+    /// How many there are.
+    pub count: u8,
+    /// For each, from the lowest bit on, whether it is executed if the first one of the block is.
+    pub alike: u8,
 }
 
 /// What becomes of the stack pointer.
@@ -64,6 +76,8 @@ pub struct Instruction {
     pub flow: Flow,
     /// What becomes of the stack pointer.
     pub stack: Stack,
+    /// Whether it may write the condition flags, also within an IT block.
+    pub flags: bool,
 }
 
 /// Bits `low..low + count` of a halfword.
@@ -94,7 +108,30 @@ fn calculated(register: u16) -> Stack {
 pub fn decode(address: u32, first: u16, second: u16) -> Instruction {
     let length = if first >= 0xe800 { 4 } else { 2 };
     let (flow, stack) = if length == 2 { narrow(address, first) } else { wide(address, first, second) };
-    Instruction { length, flow, stack }
+    Instruction { length, flow, stack, flags: if length == 2 { compares(first) } else { sets_flags(first, second) } }
+}
+
+/// Whether an instruction of one halfword compares. Within an IT block the others leave the flags alone.
+fn compares(half: u16) -> bool {
+    matches!(half >> 11, 0b00101) || matches!(half >> 8, 0x45) || matches!(half >> 6, 0x108 | 0x10a | 0x10b)
+}
+
+/// Whether an instruction of two halfwords has the bit that lets it write the flags, or moves those of the floating-point unit.
+fn sets_flags(first: u16, second: u16) -> bool {
+    let data = first >> 9 == 0b111_0101 || (0b111_1000..=0b111_1011).contains(&(first >> 9)) || first >> 9 == 0b111_1101;
+    data && first & 0x10 != 0 || first == 0xeef1 && second >> 12 == PC
+}
+
+/// An IT instruction.
+fn condition(half: u16) -> Condition {
+    let count = 4 - (half & 0xf).trailing_zeros() as u8;
+    // The mask's bits, from the highest on, are the lowest bit of the condition for each instruction after the first.
+    let alike = |index: u8| index == 0 || bits(half, 4 - u32::from(index), 1) == bits(half, 4, 1);
+    Condition {
+        code: bits(half, 4, 4) as u8,
+        count,
+        alike: (0..count).filter(|index| alike(*index)).map(|index| 1 << index).sum(),
+    }
 }
 
 /// Instructions of one halfword.
@@ -124,7 +161,7 @@ fn narrow(address: u32, half: u16) -> (Flow, Stack) {
             let flow = if half & 0x100 == 0 { Flow::Next } else { Flow::Return };
             (flow, Stack::Down(-4 * (half & 0x1ff).count_ones() as i32))
         }
-        0xbf if half & 0xf != 0 => same(Flow::Conditional(4 - (half & 0xf).trailing_zeros() as u8)),
+        0xbf if half & 0xf != 0 => same(Flow::Conditional(condition(half))),
         0xd0..=0xdd => same(Flow::Branch(pc.wrapping_add(signed(u32::from(half & 0xff) << 1, 9)))),
         0xde => same(Flow::Trap),
         0xe0..=0xe7 => same(Flow::Jump(pc.wrapping_add(signed(u32::from(half & 0x7ff) << 1, 12)))),

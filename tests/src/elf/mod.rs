@@ -16,7 +16,12 @@ pub mod graph;
 pub mod instruction;
 pub mod proof;
 
-use std::{collections::BTreeMap, fs, ops::Range, path::Path};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+    ops::Range,
+    path::Path,
+};
 
 use anyhow::{Context, Result, bail, ensure};
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
@@ -45,6 +50,8 @@ pub struct Elf {
     sections: Vec<Section>,
     /// Every symbol with a size, in the order of addresses.
     pieces: Vec<Piece>,
+    /// Functions whose jumps to addresses in registers stay within them.
+    labelled: BTreeSet<u32>,
 }
 
 /// A section that takes memory on the target.
@@ -122,7 +129,7 @@ impl Elf {
         }
         ensure!(!found.is_empty() && !mapping.is_empty(), "no symbols of functions: it was stripped");
         pieces.sort_by_key(|piece| piece.addresses.start);
-        let mut image = Self { code, functions: BTreeMap::new(), mapping, sections, pieces };
+        let mut image = Self { code, functions: BTreeMap::new(), mapping, sections, pieces, labelled: BTreeSet::new() };
         let starts: Vec<u32> = found.keys().copied().collect();
         for (index, (start, (names, size))) in found.into_iter().enumerate() {
             // Assembly often tells no size: it ends where the next function starts.
@@ -172,6 +179,32 @@ impl Elf {
     /// Where the data at an address ends.
     fn end_of_data(&self, address: u32) -> Option<u32> {
         self.mapping.range(address..).find(|(_, code)| **code).map(|(end, _)| *end)
+    }
+
+    /// Says that the functions with `name` in their names jump, where they jump to an address in a register, to labels of their own, whose
+    /// addresses are in tables between their instructions.
+    ///
+    /// # Errors
+    /// If there is no such function, or one has no such tables.
+    pub fn declare_labels(&mut self, name: &str) -> Result<()> {
+        let found = self.find(name);
+        ensure!(!found.is_empty(), "no function is called {name}");
+        for start in found {
+            self.labelled.insert(start);
+            let end = self.functions[&start].end;
+            ensure!(!self.labels(start, end).is_empty(), "{} has no table of its own labels", self.name(start));
+        }
+        Ok(())
+    }
+
+    /// Addresses within a declared function that are in its data.
+    fn labels(&self, start: u32, end: u32) -> Vec<u32> {
+        if !self.labelled.contains(&start) {
+            return Vec::new();
+        }
+        let words = (start.next_multiple_of(4)..end).step_by(4).filter(|at| !self.is_code(*at));
+        let words = words.filter_map(|at| self.bytes(at).map(u32::from_le_bytes));
+        words.filter(|word| word & 1 == 1 && (start..end).contains(word)).map(|word| word - 1).collect()
     }
 
     /// Bytes of an executable section.

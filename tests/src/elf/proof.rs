@@ -12,10 +12,7 @@ use std::{
 use anyhow::{Context, Result, bail};
 use petgraph::{algo::tarjan_scc, graphmap::DiGraphMap};
 
-use super::{
-    function::{Flaw, Function},
-    graph::CallGraph,
-};
+use super::{function::Function, graph::CallGraph};
 
 /// Parts of the names of what ends a program by a panic.
 const PANICS: [&str; 14] = [
@@ -131,7 +128,8 @@ impl Proof<'_> {
 
     /// What could not be followed. All else is proven only if there is none.
     pub fn flaws(&self) -> Vec<Finding> {
-        self.flawed(|_| true)
+        let all = self.functions().flat_map(|(entry, function)| function.flaws.iter().map(move |flaw| (entry, flaw)));
+        all.map(|(entry, flaw)| Finding { what: flaw.to_string(), chain: self.chain(entry) }).collect()
     }
 
     /// Most stack, bytes, that one of the roots needs, with all that it calls.
@@ -162,7 +160,7 @@ impl Proof<'_> {
             let [entry] = circle[..] else { bail!("the stack has no bound: {} is recursive", self.graph.image.name(circle[0])) };
             let function = self.graph.functions.get(&entry).context("a function outside of the graph")?;
             let mut deepest = (function.frame, None);
-            for (target, depth) in self.graph.calls(entry) {
+            for (target, depth) in self.reached_calls(entry) {
                 let below = bytes.get(&target);
                 let (below, _) =
                     below.with_context(|| format!("the stack has no bound: {} calls itself", self.graph.image.name(entry)))?;
@@ -186,22 +184,19 @@ impl Proof<'_> {
         self.callers.keys().filter_map(|entry| Some((*entry, self.graph.functions.get(entry)?)))
     }
 
+    fn reached_calls(&self, entry: u32) -> impl Iterator<Item = (u32, u32)> {
+        self.graph.calls(entry).into_iter().filter(|(target, _)| self.callers.contains_key(target))
+    }
+
     fn calls(&self) -> DiGraphMap<u32, ()> {
         let mut calls = DiGraphMap::new();
         for entry in self.callers.keys() {
             calls.add_node(*entry);
-            for target in self.graph.calls(*entry).into_keys() {
+            for (target, _) in self.reached_calls(*entry) {
                 calls.add_edge(*entry, target, ());
             }
         }
         calls
-    }
-
-    fn flawed(&self, counts: impl Fn(&Flaw) -> bool) -> Vec<Finding> {
-        let all = self.functions().flat_map(|(entry, function)| function.flaws.iter().map(move |flaw| (entry, flaw)));
-        all.filter(|(_, flaw)| counts(flaw))
-            .map(|(entry, flaw)| Finding { what: flaw.to_string(), chain: self.chain(entry) })
-            .collect()
     }
 
     /// Functions with such a name. What they call in turn under such names is no news.
