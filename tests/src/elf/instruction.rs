@@ -3,6 +3,9 @@
 //! *in* halfwords and their address; *out* length, [`Flow`] and [`Stack`]; *never* an instruction that writes the stack pointer or the
 //! program counter passes for one that does not; *source* Armv7-M Architecture Reference Manual (DDI 0403E), chapter A5.
 
+pub use super::condition::Condition;
+use super::condition::{compares, condition, sets_flags};
+
 /// Number of the stack pointer.
 const SP: u16 = 13;
 /// Number of the link register.
@@ -43,17 +46,6 @@ pub enum Flow {
     Trap,
     /// Nowhere on this core: no instruction of it.
     Unknown,
-}
-
-/// The instructions of an IT block that are still to come.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Condition {
-    /// Number of the first one's condition; the lowest bit turns it into its opposite.
-    pub code: u8,
-    /// How many there are.
-    pub count: u8,
-    /// For each, from the lowest bit on, whether it is executed if the first one of the block is.
-    pub alike: u8,
 }
 
 /// What becomes of the stack pointer.
@@ -111,29 +103,6 @@ pub fn decode(address: u32, first: u16, second: u16) -> Instruction {
     Instruction { length, flow, stack, flags: if length == 2 { compares(first) } else { sets_flags(first, second) } }
 }
 
-/// Whether an instruction of one halfword compares. Within an IT block the others leave the flags alone.
-fn compares(half: u16) -> bool {
-    matches!(half >> 11, 0b00101) || matches!(half >> 8, 0x45) || matches!(half >> 6, 0x108 | 0x10a | 0x10b)
-}
-
-/// Whether an instruction of two halfwords has the bit that lets it write the flags, or moves those of the floating-point unit.
-fn sets_flags(first: u16, second: u16) -> bool {
-    let data = first >> 9 == 0b111_0101 || (0b111_1000..=0b111_1011).contains(&(first >> 9)) || first >> 9 == 0b111_1101;
-    data && first & 0x10 != 0 || first == 0xeef1 && second >> 12 == PC
-}
-
-/// An IT instruction.
-fn condition(half: u16) -> Condition {
-    let count = 4 - (half & 0xf).trailing_zeros() as u8;
-    // The mask's bits, from the highest on, are the lowest bit of the condition for each instruction after the first.
-    let alike = |index: u8| index == 0 || bits(half, 4 - u32::from(index), 1) == bits(half, 4, 1);
-    Condition {
-        code: bits(half, 4, 4) as u8,
-        count,
-        alike: (0..count).filter(|index| alike(*index)).map(|index| 1 << index).sum(),
-    }
-}
-
 /// Instructions of one halfword.
 fn narrow(address: u32, half: u16) -> (Flow, Stack) {
     let pc = address.wrapping_add(4);
@@ -176,7 +145,13 @@ fn wide(address: u32, first: u16, second: u16) -> (Flow, Stack) {
     match first >> 9 {
         0b111_0100 if first & 0x40 == 0 => multiple(first, second),
         0b111_0100 => dual(address, first, second),
-        // Data processing with a shifted register.
+        // Data processing. Comparisons alone may name the program counter where others name their destination.
+        0b111_0101 | 0b111_1000..=0b111_1011
+            if second & 0x8000 == 0 && destination == PC && (first & 0x10 == 0 || first & 0xfa00 == 0xf200) =>
+        {
+            (Flow::Unknown, Stack::Same)
+        }
+        // With a shifted register.
         0b111_0101 => next(calculated(destination)),
         // Floating-point loads and stores; VPUSH and VPOP are among them.
         0b111_0110 => next(written_back(
@@ -188,7 +163,7 @@ fn wide(address: u32, first: u16, second: u16) -> (Flow, Stack) {
         0b111_1000..=0b111_1011 if second & 0x8000 != 0 => control(address, first, second),
         0b111_1000..=0b111_1011 => next(immediate(first, second)),
         0b111_1100 => single(address, first, second),
-        // Data processing with registers; multiplications, some of which have a second destination.
+        // With registers; multiplications, some of which have a second destination.
         0b111_1101 if first & 0x100 == 0 => next(calculated(destination)),
         0b111_1101 if first & 0x80 == 0 => next(calculated(destination)),
         0b111_1101 if bits(second, 12, 4) == SP => next(Stack::Dynamic),

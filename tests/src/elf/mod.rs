@@ -5,11 +5,12 @@
 //!          └────► Footprint: flash and RAM
 //! ```
 //!
-//! The instructions are decoded by [`instruction`], about 250 lines that know the flow and the stack pointer only. Of the decoders on
+//! The instructions are decoded by [`instruction`], about 300 lines that know the flow and the stack pointer only. Of the decoders on
 //! the registry, `yaxpeax-arm` 0.5 knows no floating-point instruction (VPUSH is one), `unarm` no Thumb-2, and `capstone` needs a C
 //! compiler. Each function is walked along its flow ([`function`]), so tables and literals within it are never taken for code, and
 //! each call is known with the depth of the stack at which it is made.
 
+mod condition;
 pub mod footprint;
 pub mod function;
 pub mod graph;

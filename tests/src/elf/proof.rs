@@ -221,3 +221,35 @@ impl Proof<'_> {
         chain
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_told_apart() {
+        let double = [
+            "__aeabi_dadd",
+            "__aeabi_cdcmple",
+            "__aeabi_f2d",
+            "__aeabi_d2iz",
+            "__muldf3",
+            "__floatsidf",
+            "__fixdfsi",
+            "__extendsfdf2",
+        ];
+        assert!(double.into_iter().all(is_double_precision) && is_double_precision("compiler_builtins::float::add::__adddf3"));
+        let others = ["__aeabi_fadd", "__aeabi_uldivmod", "__aeabi_memcpy4", "__addsf3", "__udivmoddi4", "pdf", "model::df2"];
+        assert!(!others.into_iter().any(is_double_precision));
+        let heap = ["malloc", "__rust_alloc", "__rustc::__rust_alloc", "__rustc::__rdl_alloc", "alloc::raw_vec::handle_error"];
+        assert!(heap.into_iter().all(is_allocation));
+        assert!(!["free_fall", "flight::allocate", "__rustc::rust_begin_unwind"].into_iter().any(is_allocation));
+        let panics = [
+            "__rustc::rust_begin_unwind",
+            "core::panicking::panic_fmt",
+            "core::option::unwrap_failed",
+            "core::slice::index::slice_index_fail",
+        ];
+        assert!(panics.into_iter().all(is_panic) && !is_panic("core::fmt::write"));
+    }
+}

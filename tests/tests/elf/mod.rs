@@ -62,6 +62,7 @@ fn the_stack_bound_holds_what_the_board_measures_and_not_half_as_much_again() {
         let flight = flight::fly(Some((&model, Lanes::BOTH)), 500, |_| None);
         let report = board::fly_again(&format!("stack {precision:?}"), Some(&file), &flight).unwrap();
         let measured = u32::try_from(report["stack_bytes"]["flight"].as_u64().unwrap()).unwrap();
+        println!("{precision:?}: bound {bound}, measured {measured}");
         assert!((measured..=measured * 3 / 2).contains(&bound), "{precision:?}: bound {bound}, measured {measured}");
     }
 }
