@@ -9,17 +9,11 @@ pub fn sqrt(x: f32) -> f32 {
     libm::sqrtf(x)
 }
 
-/// Sine of an angle in rad. Calculates in f64, which the microcontroller does in software; a function of its own, so that a binary shows
-/// where that is reached from.
+/// Sine and cosine of an angle in rad. Calculates in f64, which the microcontroller does in software; a function of its own, so that a
+/// binary shows where that is reached from.
 #[inline(never)]
-pub fn sin(x: f32) -> f32 {
-    libm::sinf(x)
-}
-
-/// Cosine of an angle in rad, like [`sin`].
-#[inline(never)]
-pub fn cos(x: f32) -> f32 {
-    libm::cosf(x)
+pub fn sin_cos(x: f32) -> (f32, f32) {
+    libm::sincosf(x)
 }
 
 /// Hyperbolic tangent.
@@ -82,6 +76,17 @@ mod tests {
             let angle = i as f32 * 0.0157;
             let error = coarse_asin(angle.sin()) - angle;
             assert!(error.abs() < 4e-3, "asin at {angle}: {error}");
+        }
+    }
+
+    #[test]
+    fn sine_and_cosine_together_have_the_bits_of_each_alone() {
+        for bits in (0..=u32::MAX).step_by(104_729) {
+            let x = f32::from_bits(bits);
+            if x.is_finite() {
+                let (sine, cosine) = sin_cos(x);
+                assert_eq!((sine.to_bits(), cosine.to_bits()), (libm::sinf(x).to_bits(), libm::cosf(x).to_bits()), "{x:e}");
+            }
         }
     }
 

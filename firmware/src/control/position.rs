@@ -72,7 +72,8 @@ impl PositionLoop {
         if reference.yaw.to_bits() != self.yaw.to_bits() {
             // Sine and cosine cost more than the rest of the loop on the target, and yaw mostly stands still.
             self.yaw = reference.yaw;
-            self.heading = Vector3::new(math::cos(self.yaw), math::sin(self.yaw), 0.0);
+            let (sine, cosine) = math::sin_cos(self.yaw);
+            self.heading = Vector3::new(cosine, sine, 0.0);
         }
         let force = acceleration * self.mass;
         if let Some(attitude) = aligned(&force, &self.heading) {
