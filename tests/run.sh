@@ -75,7 +75,7 @@ say "clippy"
 cargo clippy --workspace --all-targets --locked -- -D warnings
 
 say "clippy, microcontroller"
-(cross clippy --package impromptu-firmware --package impromptu-mcu-benchmark --lib --bins --locked --target $target --profile firmware --target-dir target/firmware -- -D warnings)
+(cross clippy --package impromptu-firmware --package impromptu-mcu-benchmark --package impromptu-planted --lib --bins --locked --target $target --profile firmware --target-dir target/firmware -- -D warnings)
 
 say "documentation"
 RUSTDOCFLAGS=-Dwarnings cargo doc --workspace --no-deps --locked

@@ -1,9 +1,9 @@
-//! What the promises need to be tested: the emulated microcontroller, its cycle model, golden texts, bytes for the decoder and
-//! the link. The
-//! promises themselves are in `tests/`.
+//! What the promises need to be tested: the emulated microcontroller, its cycle model, proofs on its binaries, golden texts, bytes for
+//! the decoder and the link. The promises themselves are in `tests/`.
 
 pub mod board;
 pub mod decoder;
+pub mod elf;
 pub mod golden;
 pub mod link;
 pub mod mcu;

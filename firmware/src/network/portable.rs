@@ -85,7 +85,7 @@ fn multiply_add(weights: [i16; 2], input: u32, sum: i32) -> i32 {
 #[inline(never)]
 pub fn float(stream: &[[u8; 4]], inputs: &[u32], relu: bool, outputs: &mut [u32]) {
     let Some([twelves, _, sixes]) = float_blocks(outputs.len()) else { return };
-    let (first, rest) = outputs.split_at_mut(12 * twelves);
+    let Some((first, rest)) = outputs.split_at_mut_checked(12 * twelves) else { return };
     let Some((first_stream, rest_stream)) = stream.split_at_checked(12 * twelves * (1 + inputs.len())) else { return };
     float_part::<12>(first_stream, inputs, relu, first);
     if sixes > 0 {
