@@ -7,7 +7,7 @@
 //! |---|---|
 //! | nothing for a while | the newest state is held; after [`Patience::lanes_s`] the add-on fades out, after [`Patience::motors_s`] motors off, disarmed |
 //! | a state that is older than the newest | ignored |
-//! | a setpoint after a gap | the gap is filled in a straight line |
+//! | a setpoint after a gap | the gap is filled in a straight line; one longer than the preview is not: the trajectory begins anew |
 //! | a setpoint that is stored already | ignored |
 //! | no setpoint any more | the end of the trajectory is held |
 
@@ -294,9 +294,15 @@ impl<'m> Autopilot<'m> {
             return Ok(());
         }
         // What lies further ahead than the preview would push out the present.
-        if gap >= PREVIEW as i32 || (next == 0 && gap > 0) {
+        let now = self.flight.reference_tick(self.tick);
+        if timed.tick.wrapping_sub(now) >= PREVIEW as i32 || (next == 0 && gap > 0) {
             return Err(Reason::Setpoint { expected: next });
         }
+        if gap >= PREVIEW as i32 {
+            // Nothing came for so long that the trajectory begins anew.
+            self.flight.restart_setpoints(timed.tick);
+        }
+        let gap = if gap < PREVIEW as i32 { gap } else { 0 };
         let start = self.setpoint;
         for missing in 1..=gap {
             let share = missing as f32 / (gap + 1) as f32;

@@ -177,10 +177,20 @@ impl<'m> Flight<'m> {
         &self.reference
     }
 
+    /// Forgets the desired trajectory: the next setpoint is that of this reference tick.
+    pub fn restart_setpoints(&mut self, tick: i32) {
+        self.preview.clear(tick);
+    }
+
+    /// Reference tick of a control tick.
+    pub fn reference_tick(&self, tick: Tick) -> i32 {
+        let divisor = self.loops.as_ref().map_or(NonZeroU32::MIN, |loops| loops.position_divisor);
+        (tick.0 / divisor) as i32
+    }
+
     /// Where the vehicle is desired to be at a control tick, m, world ENU; of the position loop's last tick.
     pub fn desired_position(&self, tick: Tick) -> Vector3<f32> {
-        let divisor = self.loops.as_ref().map_or(NonZeroU32::MIN, |loops| loops.position_divisor);
-        let [x, y, z, ..] = self.preview.sample((tick.0 / divisor) as i32);
+        let [x, y, z, ..] = self.preview.sample(self.reference_tick(tick));
         Vector3::new(x, y, z)
     }
 

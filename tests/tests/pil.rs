@@ -1,13 +1,13 @@
 //! Processor in the loop: the binary that would be flashed flies the plant, tick by tick.
 
-use impromptu_firmware::{adapter::Lanes, model::Model};
+use impromptu_firmware::{adapter::Lanes, link::message::Telemetry, model::Model, replay::ANSWER};
 use impromptu_host_sim::{
     condition::Condition,
     experiment::Loop,
     pil::{self, Board, Faults, Faulty, LinkKind},
     plant::Vehicle,
-    rollout::{FlightPlan, FlightRecord, fly_on},
-    trajectory::{Trajectory, strokes},
+    rollout::{FlightPlan, fly_on},
+    trajectory::strokes,
 };
 use impromptu_model_export::Precision;
 
@@ -16,10 +16,6 @@ use crate::board::model;
 /// The loop of the emulated flights.
 fn plant() -> Loop {
     Loop::new(Vehicle::named("crazyflie").unwrap(), "stock", Condition::named("lab").unwrap()).unwrap()
-}
-
-fn stroke(plant: &Loop) -> Trajectory {
-    strokes(1, 1, 1.0, plant.rate_hz()).unwrap().remove(0)
 }
 
 #[test]
@@ -47,18 +43,90 @@ fn flights_through_the_firmware_have_every_bit_of_the_software_and_miss_no_deadl
     assert_eq!(emulated.ended().unwrap(), Some(0));
 }
 
-/// Flies a stroke through a line with faults, after a whole line for the upload; gives the record and the telemetry's end.
-fn with_faults(faults: Faults) -> (FlightRecord, Board<Faulty<Box<dyn pil::Line>>>, pil::Emulated) {
+/// Exchanges until the vehicle has taken off.
+const TAKE_OFF: u64 = 1_000;
+
+/// What came of a flight through a line with faults.
+struct Flown {
+    /// RMS error, m.
+    rms: f64,
+    /// Motor fractions of every control tick.
+    motors: Vec<[f32; 4]>,
+    telemetry: Telemetry,
+}
+
+/// Flies a stroke through a line that has these faults from the take-off on.
+fn with_faults(faults: Faults) -> Flown {
     let plant = plant();
-    let trajectory = stroke(&plant);
+    let trajectory = strokes(1, 1, 1.0, plant.rate_hz()).unwrap().remove(0);
     let file = model::file(&model::TANH, Precision::Int8);
     let model = Model::from_bytes(&file).unwrap();
-    let elf = pil::firmware().unwrap();
-    let (emulated, line) = pil::connect(&elf, Some(&file), LinkKind::Lockstep, 3).unwrap();
-    let mut board = Board::new(Faulty::new(line, faults, 11), true);
+    let (_emulated, line) = pil::connect(&pil::firmware().unwrap(), Some(&file), LinkKind::Lockstep, 3).unwrap();
+    let mut board = Board::new(Faulty::new(line, Faults { first: TAKE_OFF, ..faults }, 11), true);
     board.introduce().unwrap();
     let mut flight = board.prepare(&plant.settings, Some(Lanes::BOTH)).unwrap();
     let plan = FlightPlan { record: true, ..FlightPlan::new(&trajectory, 7).with(&model, Lanes::BOTH) };
     let record = fly_on(&mut flight, &plant.vehicle, &plant.settings, &plant.condition, &plan).unwrap();
-    (record, board, emulated)
+    // After the motors are off the trajectory is refused.
+    let refused = flight.check().is_err();
+    assert!(!refused || !board.telemetry().armed);
+    let answers = record.recorded.unwrap().answers;
+    let motor = |bytes: &[u8], index: usize| f32::from_le_bytes(*bytes[4 * index..].first_chunk().unwrap());
+    let motors = answers.chunks(ANSWER).map(|answer| std::array::from_fn(|index| motor(answer, index))).collect();
+    Flown { rms: record.rms, motors, telemetry: *board.telemetry() }
+}
+
+#[test]
+fn a_bad_line_is_borne_and_every_motor_command_is_a_fraction() {
+    let whole = with_faults(Faults::default());
+    assert_eq!(whole.telemetry.frames.damaged + whole.telemetry.frames.dropped, 0);
+    let faults = [
+        ("1 % loss", Faults { loss: 0.01, ..Faults::default() }, 1.05),
+        ("10 % loss", Faults { loss: 0.1, ..Faults::default() }, 1.3),
+        ("bit errors", Faults { bit_errors: 1e-4, ..Faults::default() }, 1.2),
+        ("half frames", Faults { cuts: 0.05, ..Faults::default() }, 1.3),
+        ("reordering", Faults { late: 0.1, ..Faults::default() }, 1.2),
+        ("garbage", Faults { garbage: 600, ..Faults::default() }, 1.05),
+    ];
+    for (name, faults, worse) in faults {
+        let flown = with_faults(faults);
+        println!("{name}: {:.2} cm against {:.2} cm, {:?}", 100.0 * flown.rms, 100.0 * whole.rms, flown.telemetry.frames);
+        assert!(flown.motors.iter().flatten().all(|motor| (0.0..=1.0).contains(motor)), "{name}");
+        assert!(flown.telemetry.armed && flown.rms < worse * whole.rms, "{name}: {} m", flown.rms);
+        let frames = flown.telemetry.frames;
+        assert!(frames.damaged + frames.dropped + frames.reordered > 50, "{name}: the faults are counted");
+        assert_eq!(flown.telemetry.deadline_misses, 0, "{name}");
+    }
+}
+
+#[test]
+fn a_silent_peer_costs_the_add_on_first_and_then_the_motors() {
+    let silence = |ticks| with_faults(Faults { silence: Some(TAKE_OFF + 500..TAKE_OFF + 500 + ticks), ..Faults::default() });
+    let on = |flown: &Flown| flown.motors.iter().take_while(|motors| **motors != [0.0; 4]).count();
+    // 0.1 s: the newest state is held, the vehicle flies on.
+    let short = silence(50);
+    assert_eq!(on(&short), short.motors.len());
+    assert!(short.telemetry.armed);
+    // 1 s: off after 0.25 s, and off for good.
+    let long = silence(500);
+    let (off, silent_from) = (on(&long), long.motors.len().min(TAKE_OFF as usize + 500));
+    assert!(off < long.motors.len() && off.abs_diff(silent_from + 125) < 30, "motors off at tick {off}");
+    assert!(long.motors[off..].iter().all(|motors| *motors == [0.0; 4]));
+    assert!(!long.telemetry.armed);
+}
+
+#[test]
+fn the_serial_port_carries_a_flight_bit_for_bit() {
+    let plant = plant();
+    let file = model::file(&model::TANH, Precision::Int8);
+    let model = Model::from_bytes(&file).unwrap();
+    let mut trajectory = strokes(1, 1, 1.0, plant.rate_hz()).unwrap().remove(0);
+    // The emulated port manages a few hundred ticks a second.
+    trajectory.samples.truncate(300);
+    trajectory.scored = 0..300;
+    let (_emulated, mut board) = pil::start(Some(&file), LinkKind::Uart, 3).unwrap();
+    assert_eq!(board.introduce().unwrap(), Some(model.checksum()));
+    let plans = [FlightPlan::new(&trajectory, 7), FlightPlan::new(&trajectory, 7).with(&model, Lanes::BOTH)];
+    let (_, report) = pil::fly(&mut board, &plant, &plans, |_| ()).unwrap();
+    assert!(report.bit_identical && report.figures.dropped == 0, "{report:?}");
 }

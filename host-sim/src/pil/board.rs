@@ -147,7 +147,8 @@ impl<L: Line> Board<L> {
 
     /// Sends what was told and hears until `done`, or until patience ends.
     fn talk(&mut self, done: impl Fn(&Self) -> bool) {
-        let outgoing = std::mem::take(&mut self.outgoing);
+        // A zero first: what was left on the line shall not cost a frame.
+        let outgoing = std::mem::replace(&mut self.outgoing, vec![0]);
         let answer = self.line.exchange(&outgoing);
         self.hear(answer);
         let start = Instant::now();
@@ -235,10 +236,12 @@ impl<L: Line> FlightStack for BoardFlight<'_, L> {
         if tick.0.is_multiple_of(self.divisor) {
             board.tell("the position", &Command::Position(Position::new(tick, state)));
         }
-        board.tell("the attitude", &Command::Inertial(Inertial::new(tick, state)));
         if tick.0 == 0 {
+            // Armed between two attitudes: the second one is that of tick 0, however the line groups them.
+            board.tell("the attitude", &Command::Inertial(Inertial::new(Tick(u32::MAX), state)));
             board.tell("arm", &Command::Arm);
         }
+        board.tell("the attitude", &Command::Inertial(Inertial::new(tick, state)));
         board.motors = None;
         board.talk(|board| board.motors.is_some_and(|(answered, ..)| answered == tick));
         match board.motors {

@@ -10,6 +10,8 @@ use super::Line;
 /// What goes wrong. Frames end with a zero byte; exchanges are control ticks in lockstep.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Faults {
+    /// Exchanges before the first fault: the upload and the take-off.
+    pub first: u64,
     /// Share of frames that are lost.
     pub loss: f64,
     /// Share of bits that are flipped.
@@ -72,6 +74,9 @@ impl<L: Line> Line for Faulty<L> {
     fn exchange(&mut self, bytes: &[u8]) -> io::Result<Vec<u8>> {
         self.exchanges += 1;
         let silent = self.faults.silence.as_ref().is_some_and(|silence| silence.contains(&self.exchanges));
+        if self.exchanges <= self.faults.first {
+            return self.line.exchange(bytes);
+        }
         let sent = if silent { Vec::new() } else { self.damaged(bytes) };
         self.line.exchange(&sent)
     }
