@@ -2,6 +2,7 @@
 //!
 //! - [`demo`]: what `cargo run --release` shows, threshold by threshold, and that the README tells the same;
 //! - [`board`]: whole flights on the emulated microcontroller, bit by bit, with golden instruction counts;
+//! - [`c_face`]: C programs get the bits of Rust, and the header is what the source says;
 //! - [`decoder`]: mutated model files are refused or flown, never a panic;
 //! - [`emulator`]: the emulator is found, fails loudly, and counts repeatably;
 //! - [`mcu`]: what kernels cost on the microcontroller, beside other engines, with a golden table;
@@ -12,6 +13,7 @@
 //! files bit by bit damaged in `model-export`, kernels and values in `firmware`.
 
 mod board;
+mod c_face;
 mod decoder;
 mod demo;
 mod emulator;

@@ -1,0 +1,186 @@
+//! The C face: its header is up to date, strict compilers accept it, and C programs get the bits of Rust.
+
+use std::{env, fs, path::PathBuf, process::Command, time::Duration};
+
+use impromptu_firmware::{
+    adapter::{Adapter, Lanes},
+    flight::{Flight, PREVIEW},
+    model::Model,
+    network::Scratch,
+    preview::Preview,
+    quadrotor::{self, DESIRED, MEASURED, REFERENCE},
+    replay::{Event, HEADER, Header, RECORD},
+    types::{State, Tick},
+};
+use impromptu_model_export::Precision;
+use impromptu_tests::{
+    c::{self, Machine},
+    golden,
+};
+
+use crate::board::{flight, model};
+
+/// 12 s: lanes come and go, the trajectory turns.
+const TICKS: u32 = 6_000;
+const TIMEOUT: Duration = Duration::from_secs(120);
+
+/// An empty folder for the test `name`.
+fn folder(name: &str) -> PathBuf {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    if folder.exists() {
+        fs::remove_dir_all(&folder).unwrap();
+    }
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+#[test]
+fn the_header_says_what_the_source_says() {
+    let folder = c::crate_folder();
+    let config = cbindgen::Config::from_file(folder.join("cbindgen.toml")).unwrap();
+    let mut builder = cbindgen::Builder::new().with_config(config);
+    for file in ["status", "memory", "values", "edge/model", "edge/adapter", "edge/flight"] {
+        builder = builder.with_src(folder.join("src").join(file).with_extension("rs"));
+    }
+    let mut header = Vec::new();
+    builder.generate().unwrap().write(&mut header);
+    let path = c::include().join("impromptu.h");
+    if golden::updating() {
+        fs::write(&path, &header).unwrap();
+    }
+    let committed = fs::read(&path).unwrap_or_default();
+    assert!(committed == header, "{} is out of date; {}=1 writes it", path.display(), golden::UPDATE_VARIABLE);
+}
+
+#[test]
+fn strict_compilers_of_c_and_cpp_accept_the_header() {
+    let source = folder("c-header").join("header.c");
+    fs::write(&source, "#include \"impromptu.h\"\nint nothing(void);\nint nothing(void) { return IMPROMPTU_STATUS_OK; }\n")
+        .unwrap();
+    let languages: [(Command, &[&str]); 5] = [
+        (Machine::Host.compiler(), &["-std=c99"]),
+        (Machine::Host.compiler(), &["-std=c11"]),
+        (Machine::Board.compiler(), &["-std=c99"]),
+        // Enumerations of other sizes must not change the interface.
+        (Machine::Board.compiler(), &["-std=gnu11", "-fno-short-enums"]),
+        (Command::new("c++"), &["-x", "c++", "-std=c++11"]),
+    ];
+    for (mut compiler, language) in languages {
+        c::finished(compiler.args(language).args(c::STRICT).arg("-I").arg(c::include()).arg("-fsyntax-only").arg(&source))
+            .unwrap();
+    }
+}
+
+/// What the C program reads, and what it must answer: the recorded flight, flown again with numbers as they cross the C face.
+fn script(file: &[u8]) -> (Vec<u8>, Vec<u8>) {
+    let model = Model::from_bytes(file).unwrap();
+    let switches = |tick| match tick {
+        1_003 => Some(Event::Lanes(Lanes::BOTH)),
+        3_333 => Some(Event::Lanes(Lanes { network: false, feedback: true })),
+        4_000 => Some(Event::Lanes(Lanes::NONE)),
+        4_555 => Some(Event::Lanes(Lanes { network: true, feedback: false })),
+        _ => None,
+    };
+    let recording = flight::fly(Some((&model, Lanes::NONE)), TICKS, switches).recording;
+    let (header, records) = recording.split_first_chunk::<HEADER>().unwrap();
+    let settings = Header::from_bytes(header).unwrap().settings;
+
+    let mut flight = Flight::new(&settings).unwrap();
+    flight.attach(&model, &settings, Lanes::NONE).unwrap();
+    let rate = settings.rates.reference_hz();
+    let mut adapter = Adapter::<DESIRED, MEASURED, REFERENCE>::new(&model, &quadrotor::signals(), rate, PREVIEW).unwrap();
+    adapter.defer();
+    let mut preview = Preview::<DESIRED, PREVIEW>::new(quadrotor::end_rules(), 0);
+    let mut scratch = Scratch::new();
+
+    let (mut script, mut answers) = (Vec::new(), Vec::new());
+    script.extend(TICKS.to_le_bytes());
+    script.extend((file.len() as u32).to_le_bytes());
+    let impromptu_firmware::control::Airframe { mass, inertia, rotors, directions, .. } = settings.airframe;
+    let airframe =
+        [settings.airframe.thrust_coefficient, settings.airframe.torque_coefficient, settings.airframe.max_rotor_speed];
+    let position = settings.position;
+    floats(&mut script, [mass].iter().chain(&inertia).chain(rotors.as_flattened()).chain(&directions).chain(&airframe));
+    floats(&mut script, position.kp.iter().chain(&position.kd).chain(&position.ki).chain([&position.integral_limit]));
+    floats(&mut script, &[settings.attitude.kp, settings.attitude.kd, settings.rates.control_hz]);
+    script.extend(settings.rates.position_divisor.to_le_bytes());
+    script.extend(file);
+
+    let (mut lanes, mut setpoints, mut tick) = (0u32, Vec::new(), 0);
+    for record in records.as_chunks::<RECORD>().0 {
+        let event = Event::from_bytes(record).unwrap();
+        event.prepare(&mut flight);
+        match event {
+            Event::Lanes(Lanes { network, feedback }) => {
+                lanes = 4 | u32::from(network) | u32::from(feedback) << 1;
+                adapter.switch(Lanes { network, feedback });
+            }
+            Event::Setpoint(setpoint) => {
+                setpoints.push(quadrotor::desired(&setpoint));
+                preview.push(quadrotor::desired(&setpoint));
+            }
+            Event::Tick(state) => {
+                script.extend(lanes.to_le_bytes());
+                script.extend((setpoints.len() as u32).to_le_bytes());
+                setpoints.iter().for_each(|setpoint| floats(&mut script, setpoint));
+                (lanes, setpoints) = (0, Vec::new());
+                let q = state.attitude.quaternion();
+                let attitude = [q.w, q.i, q.j, q.k];
+                let (p, v, w): ([f32; 3], [f32; 3], [f32; 3]) =
+                    (state.position.into(), state.velocity.into(), state.rates.into());
+                let mut numbers = [0.0; 14];
+                for (place, number) in numbers.iter_mut().zip(p.iter().chain(&v).chain(&attitude).chain(&w)) {
+                    *place = *number;
+                }
+                floats(&mut script, &numbers);
+
+                let state = State::from_raw(p, v, attitude, w).unwrap();
+                let command = flight.step(Tick(tick), &state, &mut scratch);
+                let reference = flight.reference();
+                floats(&mut answers, &command.fractions());
+                floats(&mut answers, reference.position.iter().chain(&reference.velocity).chain([&reference.yaw]));
+                if tick.is_multiple_of(settings.rates.position_divisor) {
+                    let reference_tick = (tick / settings.rates.position_divisor) as i32;
+                    let measured = std::array::from_fn(|channel| numbers[channel]);
+                    let reference = adapter.step(reference_tick, &preview, &measured, &mut scratch);
+                    floats(&mut answers, reference.iter().chain(adapter.correction()).chain(&adapter.weights()));
+                    answers.extend(
+                        [adapter.saturations(), adapter.late(), preview.next_tick() as u32].map(u32::to_le_bytes).as_flattened(),
+                    );
+                }
+                tick += 1;
+            }
+            Event::Excitation(_) | Event::End { .. } => {}
+        }
+    }
+    assert_eq!(tick, TICKS);
+    (script, answers)
+}
+
+fn floats<'a>(bytes: &mut Vec<u8>, numbers: impl IntoIterator<Item = &'a f32>) {
+    numbers.into_iter().for_each(|number| bytes.extend(number.to_le_bytes()));
+}
+
+#[test]
+fn a_c_program_gets_the_bits_of_rust_here_and_on_the_emulated_board() {
+    let file = model::file(&model::TANH, Precision::Int8);
+    let (script, expected) = script(&file);
+    for (machine, name) in [(Machine::Host, "c-host"), (Machine::Board, "c-board")] {
+        let folder = folder(name);
+        fs::write(folder.join("script.bin"), &script).unwrap();
+        let program = machine.program(&folder, &[], &["flight.c"]).unwrap();
+        let sizes = machine.run(&program, &folder, TIMEOUT).unwrap();
+        let answers = fs::read(folder.join("answers.bin")).unwrap();
+        let differs = answers.iter().zip(&expected).position(|(a, b)| a != b);
+        assert!(
+            differs.is_none() && answers.len() == expected.len(),
+            "{name}: byte {differs:?}, {} of {}",
+            answers.len(),
+            expected.len()
+        );
+        // The header's sizes are not much larger than needed: the caller pays for them.
+        let sizes: serde_json::Value = serde_json::from_str(&sizes).unwrap();
+        assert!(sizes["adapter"].as_u64().unwrap() > 12_288, "{sizes}");
+        println!("{name}: {sizes}");
+    }
+}
