@@ -33,7 +33,7 @@
 
 #if defined(IMPROMPTU_POINTER_64)
 // Words of 8 bytes of an impromptu_model.
-#define IMPROMPTU_MODEL_WORDS 1024
+#define IMPROMPTU_MODEL_WORDS 640
 #endif
 
 #if defined(IMPROMPTU_POINTER_32)
@@ -43,7 +43,7 @@
 
 #if defined(IMPROMPTU_POINTER_64)
 // Words of 8 bytes of an impromptu_adapter.
-#define IMPROMPTU_ADAPTER_WORDS 2048
+#define IMPROMPTU_ADAPTER_WORDS 2096
 #endif
 
 #if defined(IMPROMPTU_POINTER_32)
@@ -53,7 +53,7 @@
 
 #if defined(IMPROMPTU_POINTER_64)
 // Words of 8 bytes of an impromptu_flight.
-#define IMPROMPTU_FLIGHT_WORDS 2048
+#define IMPROMPTU_FLIGHT_WORDS 1568
 #endif
 
 #if defined(IMPROMPTU_POINTER_32)

@@ -9,19 +9,19 @@ use crate::{adapter::Stage, flight::Stack};
 
 /// Words of 8 bytes of an impromptu_model.
 #[cfg(target_pointer_width = "64")]
-pub const MODEL_WORDS: usize = 1024;
+pub const MODEL_WORDS: usize = 640;
 /// Words of 8 bytes of an impromptu_model.
 #[cfg(target_pointer_width = "32")]
 pub const MODEL_WORDS: usize = 448;
 /// Words of 8 bytes of an impromptu_adapter.
 #[cfg(target_pointer_width = "64")]
-pub const ADAPTER_WORDS: usize = 2048;
+pub const ADAPTER_WORDS: usize = 2096;
 /// Words of 8 bytes of an impromptu_adapter.
 #[cfg(target_pointer_width = "32")]
 pub const ADAPTER_WORDS: usize = 2080;
 /// Words of 8 bytes of an impromptu_flight.
 #[cfg(target_pointer_width = "64")]
-pub const FLIGHT_WORDS: usize = 2048;
+pub const FLIGHT_WORDS: usize = 1568;
 /// Words of 8 bytes of an impromptu_flight.
 #[cfg(target_pointer_width = "32")]
 pub const FLIGHT_WORDS: usize = 1568;
