@@ -1,12 +1,11 @@
 /*
- * The Crazyflie's controller with a stock controller and a trajectory memory that only remember: flies `model.h`'s model along a straight
+ * The Crazyflie's controller with a stock controller and a trajectory memory that only remember: flies a straight
  * line and writes what the stock controller was told at every reference tick to `answers.bin`.
  */
 #include <stdio.h>
 #include <string.h>
 
 #include "controller_impromptu.c"
-#include "model.h"
 
 static setpoint_t told;
 

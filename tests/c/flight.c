@@ -192,6 +192,9 @@ static int run(void)
     EXPECT(fly(ticks, settings.position_divisor) == 0);
     DO(impromptu_flight_report(&flight, &report));
     EXPECT(report.late == 0 && report.network_weight == 1.0f);
+    DO(impromptu_adapter_restart(&adapter, 7));
+    DO(impromptu_adapter_report(&adapter, &report));
+    EXPECT(report.next_tick == 7);
     printf("{\"model\":%u,\"adapter\":%u,\"flight\":%u}\n", (unsigned)impromptu_model_size(), (unsigned)impromptu_adapter_size(),
            (unsigned)impromptu_flight_size());
     return 0;

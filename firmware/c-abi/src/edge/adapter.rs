@@ -142,8 +142,9 @@ pub unsafe extern "C" fn impromptu_adapter_step(
     report(|| {
         let place = Place::new(reference)?;
         // SAFETY: the module's rules.
-        let (adapter, scratch, measured) =
-            unsafe { (object::<Stage>(adapter)?, object::<Scratch>(scratch)?, channels(measured, measured_count)?) };
+        let (adapter, scratch) = unsafe { (object::<Stage>(adapter)?, object::<Scratch>(scratch)?) };
+        // SAFETY: the module's rules.
+        let measured = unsafe { channels(measured, measured_count)? };
         adapter.counted([None, Some(measured_count), Some(reference_count)])?;
         let values = adapter.step(tick, &measured, scratch);
         // SAFETY: the module's rules.
