@@ -255,3 +255,32 @@ fn the_crazyflie_controller_corrects_setpoints_and_converts_degrees_and_pitch() 
     }
     assert!(moved && adapter.late() == 0, "the correction was flown");
 }
+
+/// Bytes of stack that each call may need on the microcontroller; the header and the Crazyflie's example tell these.
+#[test]
+fn calls_from_c_need_no_more_stack_than_the_header_says() {
+    let folder = folder("c-stack");
+    let source = model_source(&folder, &model::file(&model::TANH, Precision::Int8));
+    let program = Machine::Board.program(&folder, &[], &["stack.c", source.to_str().unwrap()]).unwrap();
+    let used = Machine::Board.run(&program, &folder, TIMEOUT).unwrap();
+    println!("{used}");
+    let used: serde_json::Map<String, serde_json::Value> = serde_json::from_str(&used).unwrap();
+    let header = fs::read_to_string(c::include().join("impromptu.h")).unwrap();
+    for (call, kilobytes) in
+        [("model_create", 16), ("adapter_create", 4), ("flight_create", 24), ("flight_attach", 12), ("flight_control", 4)]
+    {
+        let prototype = header.find(&format!("impromptu_{call}(")).unwrap();
+        let comment = &header[header[..prototype].rfind("\n\n").unwrap()..prototype];
+        assert!(comment.contains(&format!("{kilobytes} KB of stack")), "{call}: {comment}");
+    }
+    for (call, bytes) in &used {
+        let limit = match call.as_str() {
+            "model_create" => 16_384,
+            "adapter_create" | "flight_control" => 4_096,
+            "flight_create" => 24_576,
+            "flight_attach" => 12_288,
+            _ => 2_048,
+        };
+        assert!(bytes.as_u64().unwrap() <= limit, "{call} needs {bytes} bytes of stack");
+    }
+}

@@ -115,12 +115,6 @@ pub struct Job {
     pub inputs: [f32; MAX_FEATURES],
 }
 
-impl From<adapter::Job> for Job {
-    fn from(adapter::Job { tick, inputs }: adapter::Job) -> Self {
-        Self { tick, inputs }
-    }
-}
-
 impl From<Job> for adapter::Job {
     fn from(Job { tick, inputs }: Job) -> Self {
         Self { tick, inputs }

@@ -13,6 +13,7 @@ use crate::{
 };
 
 /// Creates a flight stack in `flight`, which has `size` bytes, with no add-on. The first setpoint is that of reference tick 0.
+/// Needs up to 24 KB of stack.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_flight_create(
     flight: *mut FlightMemory,
@@ -34,6 +35,7 @@ pub unsafe extern "C" fn impromptu_flight_create(
 }
 
 /// Puts an add-on before the loop, with the lanes that are not 0 on. The model must live as long as the flight stack.
+/// Needs up to 12 KB of stack.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_flight_attach(
     flight: *mut FlightMemory,
@@ -68,7 +70,7 @@ pub unsafe extern "C" fn impromptu_flight_switch(flight: *mut FlightMemory, netw
 }
 
 /// One control tick, the network included. Ticks count from 0. A state that is not finite gives IMPROMPTU_STATUS_NOT_FINITE and no
-/// command: what the motors then do is the caller's decision.
+/// command: what the motors then do is the caller's decision. Needs up to 4 KB of stack.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_flight_step(
     flight: *mut FlightMemory,
@@ -90,6 +92,7 @@ pub unsafe extern "C" fn impromptu_flight_step(
 
 /// One control tick without the network: the same commands as impromptu_flight_step, if each inference is delivered before the next
 /// reference tick. Sets `due` to 1 and writes `job` if the network is to be evaluated (impromptu_job_run), else sets it to 0.
+/// Needs up to 4 KB of stack.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_flight_control(
     flight: *mut FlightMemory,
@@ -108,8 +111,8 @@ pub unsafe extern "C" fn impromptu_flight_control(
         unsafe {
             place.write(command);
             flag.write(c_int::from(released.is_some()));
-            if let Some(released) = released {
-                work.write(released.into());
+            if let Some(released) = &released {
+                work.write_job(released);
             }
         }
         Ok(())

@@ -24,6 +24,7 @@ use crate::{
     adapter::Channels,
     memory::{Object, Stored},
     status::Status,
+    values::Job,
 };
 
 pub use adapter::*;
@@ -128,5 +129,16 @@ impl<T: Copy> Place<T> {
     unsafe fn write_first(&self, values: &[T], count: usize) {
         // SAFETY: a place for `count` values that nobody else uses.
         unsafe { ptr::copy(values.as_ptr(), self.0, count.min(values.len())) };
+    }
+}
+
+impl Place<Job> {
+    /// Writes a job field by field: it is large, and control tasks have small stacks.
+    unsafe fn write_job(&self, job: &impromptu_firmware::adapter::Job) {
+        // SAFETY: a place for one job that nobody else uses.
+        unsafe {
+            ptr::addr_of_mut!((*self.0).tick).write(job.tick);
+            ptr::copy(job.inputs.as_ptr(), ptr::addr_of_mut!((*self.0).inputs).cast(), job.inputs.len());
+        }
     }
 }
