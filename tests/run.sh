@@ -31,7 +31,9 @@ install() {
 say "tools"
 # cc also builds the cycle model of `cargo mcu`, a plugin of QEMU; it needs no header of QEMU.
 has cc || install "gcc libc6-dev" "macOS: run xcode-select --install"
+has c++ || install "g++ libc6-dev" "macOS: run xcode-select --install"
 has qemu-system-arm || install qemu-system-arm "macOS: run brew install qemu"
+has arm-none-eabi-gcc || install "gcc-arm-none-eabi libnewlib-arm-none-eabi" "macOS: run brew install --cask gcc-arm-embedded"
 has cargo && has rustc || fail "Rust is missing; install it from https://rustup.rs"
 rustc --version
 version=$(rustc --version | cut -d' ' -f2)
@@ -75,7 +77,8 @@ say "clippy"
 cargo clippy --workspace --all-targets --locked -- -D warnings
 
 say "clippy, microcontroller"
-(cross clippy --package impromptu-firmware --package impromptu-mcu-benchmark --package impromptu-planted --lib --bins --locked --target $target --profile firmware --target-dir target/firmware -- -D warnings)
+(cross clippy --package impromptu-firmware --package impromptu-c-abi --package impromptu-mcu-benchmark --package impromptu-planted --lib --bins --locked --target $target --profile firmware --target-dir target/firmware -- -D warnings)
+(cross clippy --package impromptu-board --bins --locked --target $target --profile firmware --target-dir target/firmware -- -D warnings)
 
 say "documentation"
 RUSTDOCFLAGS=-Dwarnings cargo doc --workspace --no-deps --locked
@@ -84,7 +87,6 @@ say "tests"
 cargo test --workspace --locked --profile checked
 
 say "fuzzing the decoders for ${IMPROMPTU_FUZZ_SECONDS:=20} s"
-has c++ || install "g++ libc6-dev" "macOS: run xcode-select --install"
 cargo fuzz --version >/dev/null 2>&1 || cargo install --locked cargo-fuzz || fail "cargo-fuzz is missing; run: cargo install cargo-fuzz"
 # Half of the time for each. Without a sanitizer the toolchain need not be a nightly one. In safe Rust a read out of bounds is a panic,
 # an overflow too (cargo-fuzz turns the checks on).

@@ -32,6 +32,11 @@ impl<const D: usize, const N: usize> Preview<D, N> {
         Self { samples: [[0.0; D]; N], rules, next: first, stored: 0 }
     }
 
+    /// Makes it an empty preview again, in place: as [`Preview::new`], without a copy of it on the stack.
+    pub fn restart(&mut self, rules: [EndRule; D], first: i32) {
+        (self.rules, self.next, self.stored) = (rules, first, 0);
+    }
+
     /// Appends the sample of the next tick; the oldest one is dropped when the ring is full.
     #[inline]
     pub fn push(&mut self, sample: [f32; D]) {
@@ -119,6 +124,15 @@ mod tests {
     #[test]
     fn an_empty_preview_is_zero() {
         assert_eq!(filled(0).sample(5), [0.0, 0.0]);
+    }
+
+    #[test]
+    fn a_restarted_preview_knows_nothing_of_the_past() {
+        let mut preview = filled(12);
+        preview.restart([EndRule::Zero, EndRule::Hold], 100);
+        assert_eq!((preview.sample(11), preview.next_tick()), ([0.0, 0.0], 100));
+        preview.push([1.0, 2.0]);
+        assert_eq!((preview.sample(99), preview.sample(100)), ([0.0, 2.0], [1.0, 2.0]));
     }
 
     proptest! {

@@ -192,7 +192,7 @@ fn missing_emulator(program: &str) -> anyhow::Error {
 }
 
 /// Fails, with what to do, if the compiler has no library for [`TARGET`].
-fn require_target() -> Result<()> {
+pub fn require_target() -> Result<()> {
     let asked = tool("rustc").args(["--print", "target-libdir", "--target", TARGET]).output().context("cannot start rustc")?;
     let folder = String::from_utf8_lossy(&asked.stdout).trim().to_owned();
     ensure!(
@@ -204,7 +204,7 @@ fn require_target() -> Result<()> {
 }
 
 /// `cargo` or `rustc` of the toolchain that has [`TARGET`], free of what the running tests inherited.
-fn tool(name: &str) -> Command {
+pub fn tool(name: &str) -> Command {
     let mut command = match env::var_os(TOOLCHAIN_VARIABLE).filter(|value| !value.is_empty()) {
         Some(toolchain) => {
             let programs = workspace().join(toolchain).join("bin");
@@ -237,7 +237,7 @@ fn runner() -> Result<Vec<String>> {
 }
 
 /// The folder of the workspace.
-fn workspace() -> &'static Path {
+pub fn workspace() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
 }
 

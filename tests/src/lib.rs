@@ -1,7 +1,8 @@
-//! What the promises need to be tested: the emulated microcontroller, its cycle model, proofs on its binaries, golden texts, bytes for
-//! the decoder and the link. The promises themselves are in `tests/`.
+//! What the promises need to be tested: the emulated microcontroller, its cycle model, proofs on its binaries,
+//! C programs, golden texts, bytes for the decoder and the link. The promises themselves are in `tests/`.
 
 pub mod board;
+pub mod c;
 pub mod decoder;
 pub mod elf;
 pub mod golden;

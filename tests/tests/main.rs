@@ -2,6 +2,7 @@
 //!
 //! - [`demo`]: what `cargo run --release` shows, threshold by threshold, and that the README tells the same;
 //! - [`board`]: whole flights on the emulated microcontroller, bit by bit, with golden instruction counts;
+//! - [`c_face`]: C programs get the bits of Rust, and the header is what the source says;
 //! - [`decoder`]: mutated model files are refused or flown, never a panic;
 //! - [`elf`]: what a control tick can reach in the flashed binary: no panic, no heap; its stack, with golden memory;
 //! - [`emulator`]: the emulator is found, fails loudly, and counts repeatably;
@@ -14,6 +15,7 @@
 //! files bit by bit damaged in `model-export`, kernels and values in `firmware`.
 
 mod board;
+mod c_face;
 mod decoder;
 mod demo;
 mod elf;

@@ -1,9 +1,18 @@
-//! One module alone contains unsafe code, and says of every block why it is sound.
+//! Two places alone contain unsafe code, the assembly and the C face, and say of every block why it is sound.
 
 use std::{fs, path::Path};
 
 /// Where the assembly is.
 const KERNELS: &str = "firmware/src/network/cortex_m4.rs";
+/// Where pointers of C become values. The permission for the folder, and the conditions of every function, are in the first file.
+const EDGE: [&str; 6] = [
+    "firmware/c-abi/src/edge/mod.rs",
+    "firmware/c-abi/src/edge/adapter.rs",
+    "firmware/c-abi/src/edge/flight.rs",
+    "firmware/c-abi/src/edge/model.rs",
+    "firmware/c-abi/src/edge/panic.rs",
+    "firmware/c-abi/src/edge/signals.rs",
+];
 
 /// Rust files below `folder`, as paths from `top`, with their text.
 fn sources(top: &Path, folder: &Path, found: &mut Vec<(String, String)>) {
@@ -21,7 +30,7 @@ fn sources(top: &Path, folder: &Path, found: &mut Vec<(String, String)>) {
 }
 
 #[test]
-fn unsafe_code_is_in_the_kernels_alone_and_explained() {
+fn unsafe_code_is_in_the_kernels_and_the_c_face_alone_and_explained() {
     let top = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).canonicalize().unwrap();
     let mut files = Vec::new();
     sources(&top, &top, &mut files);
@@ -36,18 +45,26 @@ fn unsafe_code_is_in_the_kernels_alone_and_explained() {
             code.contains(&permission) || words.into_iter().any(|word| word == keyword)
         };
         let lines = text.lines().filter(uses).count();
-        assert!(lines == 0 || place == KERNELS, "{place} contains {keyword} code");
+        assert!(lines == 0 || place == KERNELS || EDGE.contains(&place.as_str()), "{place} contains {keyword} code");
     }
-    let (_, kernels) = files.iter().find(|(place, _)| place == KERNELS).unwrap();
-    let lines: Vec<&str> = kernels.lines().collect();
-    for (index, line) in lines.iter().enumerate() {
-        let mut above = lines[..index].iter().rev().take_while(|line| line.trim_start().starts_with("//") || line.contains("#["));
-        let mut explained = |words: &str| above.any(|line| line.contains(words));
-        if line.contains(&format!("{keyword} {{")) {
-            assert!(explained("SAFETY:"), "{KERNELS}:{}: without a reason", index + 1);
-        }
-        if line.contains(&format!("{keyword} extern")) {
-            assert!(explained("# Safety"), "{KERNELS}:{}: without its conditions", index + 1);
+    let permitted =
+        files.iter().filter(|(_, text)| text.lines().any(|line| line.trim().starts_with(&format!("#![{permission}"))));
+    assert!(permitted.count() <= 2, "a module has a permission of its own");
+    for place in [KERNELS].iter().chain(&EDGE) {
+        let (_, text) = files.iter().find(|(file, _)| file == place).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        for (index, line) in lines.iter().enumerate() {
+            let mut above =
+                lines[..index].iter().rev().take_while(|line| line.trim_start().starts_with("//") || line.contains("#["));
+            let mut explained = |words: &str| above.any(|line| line.contains(words));
+            if line.contains(&format!("{keyword} {{")) && !line.trim_start().starts_with("//") {
+                assert!(explained("SAFETY:"), "{place}:{}: without a reason", index + 1);
+            }
+            if *place == KERNELS && line.contains(&format!("{keyword} extern")) {
+                assert!(explained("# Safety"), "{place}:{}: without its conditions", index + 1);
+            }
         }
     }
+    let (_, edge) = files.iter().find(|(file, _)| file == EDGE[0]).unwrap();
+    assert!(edge.contains("//! # Safety"), "{} states the conditions of every function", EDGE[0]);
 }

@@ -45,17 +45,18 @@ pub(super) fn base_channels<const R: usize>(table: &SignalTable<'_>) -> [usize; 
     })
 }
 
-/// Refuses a model whose channels are not the application's.
-pub(super) fn same_signals(card: &Card<'_>, table: &SignalTable<'_>, counts: [usize; 3]) -> Result<(), Refusal> {
+/// Refuses a model whose channels are not the application's, or do not fit into arrays of `limits` channels. Array elements behind the
+/// table's channels are not used.
+pub(super) fn same_signals(card: &Card<'_>, table: &SignalTable<'_>, limits: [usize; 3]) -> Result<(), Refusal> {
     let pairs = [
         ("desired", &card.signals.desired, &table.desired),
         ("measured", &card.signals.measured, &table.measured),
         ("reference", &card.signals.reference, &table.reference),
     ];
-    for ((signal, model, application), count) in pairs.into_iter().zip(counts) {
+    for ((signal, model, application), limit) in pairs.into_iter().zip(limits) {
         let differs = model.iter().zip(application).position(|(a, b)| a != b);
         let length =
-            (model.len() != application.len() || model.len() != count).then_some(model.len().min(application.len()).min(count));
+            (model.len() != application.len() || model.len() > limit).then_some(model.len().min(application.len()).min(limit));
         if let Some(channel) = differs.or(length) {
             return Err(Refusal::Signal { signal, channel: channel as u8 });
         }

@@ -31,7 +31,7 @@ pub const fn pair(low: i16, high: i16) -> u32 {
 /// A layer of [`super::Integer`] on any machine: `outputs` are all that it has.
 #[inline(never)]
 pub fn integer(width: Width, stream: &[[u8; 4]], inputs: &[u32], finish: Finish, outputs: &mut [u32]) {
-    let blocks = stream.chunks_exact(width.block(inputs.len()));
+    let blocks = stream.chunks_exact(width.block(inputs.len()).max(1));
     for (block, outputs) in blocks.zip(outputs.chunks_exact_mut(finish.words())) {
         let Some((bias, rest)) = block.split_first_chunk::<ROWS>() else { return };
         let Some((weights, multipliers)) = rest.split_last_chunk::<ROWS>() else { return };
@@ -97,7 +97,7 @@ pub fn float(stream: &[[u8; 4]], inputs: &[u32], relu: bool, outputs: &mut [u32]
 
 /// The blocks of `N` rows.
 fn float_part<const N: usize>(stream: &[[u8; 4]], inputs: &[u32], relu: bool, outputs: &mut [u32]) {
-    for (block, outputs) in stream.chunks_exact(N * (1 + inputs.len())).zip(outputs.as_chunks_mut::<N>().0) {
+    for (block, outputs) in stream.chunks_exact((N * (1 + inputs.len())).max(1)).zip(outputs.as_chunks_mut::<N>().0) {
         let Some((bias, weights)) = block.split_first_chunk::<N>() else { return };
         let mut sums = bias.map(f32::from_le_bytes);
         for (weights, &input) in weights.as_chunks::<N>().0.iter().zip(inputs) {

@@ -1,0 +1,485 @@
+/**
+ * Impromptu for C: a learned add-on that corrects the references of a control loop, and the quadrotor loop that is its first user.
+ *
+ * C99 and C++. Made from firmware/c-abi/src by a test; do not edit.
+ *
+ *   desired trajectory (pushed ahead) --> adapter --> reference --> your loop
+ *   measured state ------------------------^
+ *
+ * Memory   The caller owns all of it. An object is created in memory of its type, static or not, and needs no destruction: forget it or
+ *          create it anew. Memory that never held an object must be zeroed (as static memory is), so that use before creation is
+ *          found. An object must not be moved or copied. A model file's bytes must outlive the model, the model what was created from it.
+ * Threads  No globals, no locks, no clock, no allocation. Calls with different objects may run at the same time. Calls with the same
+ *          object must not, but for a model, which is only read after its creation. So a control interrupt may call the adapter while
+ *          a task of lower priority is in impromptu_job_run. Job and inference are copied; hand them over as you hand over other data.
+ * Time     Ticks are arguments. A reference tick is a period of the loop's references; call once for each, in order. After a
+ *          gap the adapter starts its histories anew.
+ * Units    SI and radians. World frame ENU (z up), body frame FLU, Hamilton quaternion body to world.
+ * Errors   Every call that can fail returns an impromptu_status. NULL, misaligned pointers, objects that were not created and counts
+ *          that differ are found; pointers to too few values are not. Nothing unwinds or prints. On a microcontroller no part of the
+ *          library can panic: else the linker would miss the symbol impromptu_can_panic.
+ */
+
+#ifndef IMPROMPTU_H
+#define IMPROMPTU_H
+
+#include <stddef.h>
+#include <stdint.h>
+#if UINTPTR_MAX > 0xffffffffu
+#define IMPROMPTU_POINTER_64
+#else
+#define IMPROMPTU_POINTER_32
+#endif
+
+#if defined(IMPROMPTU_POINTER_64)
+// Words of 8 bytes of an impromptu_model.
+#define IMPROMPTU_MODEL_WORDS 640
+#endif
+
+#if defined(IMPROMPTU_POINTER_32)
+// Words of 8 bytes of an impromptu_model.
+#define IMPROMPTU_MODEL_WORDS 448
+#endif
+
+#if defined(IMPROMPTU_POINTER_64)
+// Words of 8 bytes of an impromptu_adapter.
+#define IMPROMPTU_ADAPTER_WORDS 2096
+#endif
+
+#if defined(IMPROMPTU_POINTER_32)
+// Words of 8 bytes of an impromptu_adapter.
+#define IMPROMPTU_ADAPTER_WORDS 2080
+#endif
+
+#if defined(IMPROMPTU_POINTER_64)
+// Words of 8 bytes of an impromptu_flight.
+#define IMPROMPTU_FLIGHT_WORDS 1568
+#endif
+
+#if defined(IMPROMPTU_POINTER_32)
+// Words of 8 bytes of an impromptu_flight.
+#define IMPROMPTU_FLIGHT_WORDS 1568
+#endif
+
+// Words of 8 bytes of an impromptu_scratch.
+#define IMPROMPTU_SCRATCH_WORDS 257
+
+// Most channels of a signal.
+#define IMPROMPTU_MAX_CHANNELS 16
+
+// Most network inputs.
+#define IMPROMPTU_MAX_FEATURES 128
+
+// Most corrected channels.
+#define IMPROMPTU_MAX_OUTPUTS 8
+
+// Samples of the desired trajectory that an adapter or a flight stack keeps, past ones included.
+#define IMPROMPTU_PREVIEW 192
+
+// What came of a call; impromptu_status_text says it in words. After anything but IMPROMPTU_STATUS_OK nothing was changed and
+// no output was written, unless the function says otherwise.
+enum impromptu_status
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  // Done.
+  IMPROMPTU_STATUS_OK = 0,
+  // A pointer is NULL.
+  IMPROMPTU_STATUS_NULL = 1,
+  // A pointer is not aligned for its type.
+  IMPROMPTU_STATUS_MISALIGNED = 2,
+  // The memory for an object is too small: header and library are of different versions.
+  IMPROMPTU_STATUS_MEMORY = 3,
+  // The object was not created, or is of another kind.
+  IMPROMPTU_STATUS_NOT_CREATED = 4,
+  // A count of channels differs from the signal table's, or exceeds IMPROMPTU_MAX_CHANNELS.
+  IMPROMPTU_STATUS_COUNT = 5,
+  // A number is NaN or infinite.
+  IMPROMPTU_STATUS_NOT_FINITE = 6,
+  // A name, unit or frame is not UTF-8.
+  IMPROMPTU_STATUS_TEXT = 7,
+  // The settings are impossible: a rate that is not positive, or an airframe whose rotors cannot produce every moment.
+  IMPROMPTU_STATUS_SETTINGS = 8,
+  // The model has no network, or the flight stack no model.
+  IMPROMPTU_STATUS_NOTHING = 9,
+  // The model file is damaged or incomplete: copy it again.
+  IMPROMPTU_STATUS_DAMAGED = 16,
+  // Not a model file: give the file that model-export wrote.
+  IMPROMPTU_STATUS_NOT_A_MODEL = 17,
+  // Another format version: export the model with the matching model-export.
+  IMPROMPTU_STATUS_VERSION = 18,
+  // The model's card cannot be decoded: export it again.
+  IMPROMPTU_STATUS_CARD = 19,
+  // A count, shape or section is impossible or larger than this build allows: train a model that fits.
+  IMPROMPTU_STATUS_SHAPE = 20,
+  // A number in the model is not finite, out of range, or names what the model does not have: correct it and export again.
+  IMPROMPTU_STATUS_VALUE = 21,
+  // An integer layer could overflow: calibrate and export again.
+  IMPROMPTU_STATUS_OVERFLOW = 22,
+  // A probe gives other bits on this machine: do not fly, report it.
+  IMPROMPTU_STATUS_PROBE = 23,
+  // The stated bounds or limits exclude what the network gives: export the model again.
+  IMPROMPTU_STATUS_BOUNDS = 24,
+  // The signals of model and application differ in number, name, unit, frame or end rule.
+  IMPROMPTU_STATUS_SIGNALS = 25,
+  // The model looks further than IMPROMPTU_PREVIEW samples.
+  IMPROMPTU_STATUS_PREVIEW = 26,
+  // The model was trained for another rate of the references.
+  IMPROMPTU_STATUS_RATE = 27,
+  // The model is refused for a reason that this version of the library cannot name.
+  IMPROMPTU_STATUS_REFUSED = 28,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum impromptu_status impromptu_status;
+#else
+typedef int32_t impromptu_status;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// Memory for a model, in place: the model file itself stays where it is.
+typedef struct impromptu_model {
+  // Not for the caller.
+  uint64_t words[IMPROMPTU_MODEL_WORDS];
+} impromptu_model;
+
+// What a model says of itself.
+typedef struct impromptu_description {
+  // CRC-32 that identifies the file.
+  uint32_t checksum;
+  // Desired, measured and reference channels.
+  uint32_t channels[3];
+  // Rate of the references, Hz.
+  float reference_rate_hz;
+  // Reference ticks in a tick of the network lane.
+  uint32_t divisor;
+  // Reference ticks of the past that must stay in the preview.
+  uint32_t past;
+  // Reference ticks of the future that should be pushed ahead.
+  uint32_t future;
+  // Corrected channels.
+  uint32_t outputs;
+  // 1 if there is a network lane.
+  uint32_t network;
+  // 1 if there is a feedback lane.
+  uint32_t feedback;
+} impromptu_description;
+
+// Working memory for one evaluation of a network at a time.
+typedef struct impromptu_scratch {
+  // Not for the caller.
+  uint64_t words[IMPROMPTU_SCRATCH_WORDS];
+} impromptu_scratch;
+
+// One evaluation of the network that is to be done.
+typedef struct impromptu_job {
+  // Reference tick at which it was released.
+  int32_t tick;
+  // The model's features, in physical units; zeros behind the last.
+  float inputs[IMPROMPTU_MAX_FEATURES];
+} impromptu_job;
+
+// One evaluation of the network that was done.
+typedef struct impromptu_inference {
+  // Reference tick of its job.
+  int32_t tick;
+  // Correction of each output of the model.
+  float outputs[IMPROMPTU_MAX_OUTPUTS];
+} impromptu_inference;
+
+// Memory for an adapter and the trajectory ahead of it.
+typedef struct impromptu_adapter {
+  // Not for the caller.
+  uint64_t words[IMPROMPTU_ADAPTER_WORDS];
+} impromptu_adapter;
+
+// One channel of a signal. The texts must live until the adapter is created.
+typedef struct impromptu_channel {
+  // Name, for example "position.x"; of a reference channel, that of the desired channel from which it starts.
+  const char *name;
+  // SI unit, for example "m/s".
+  const char *unit;
+  // Frame, for example "world ENU".
+  const char *frame;
+  // Beyond the trajectory's ends: 0 the nearest sample is held (positions), 1 the channel is zero (velocities).
+  uint32_t zero_beyond;
+} impromptu_channel;
+
+// The application's signals, compared with the model's.
+typedef struct impromptu_signals {
+  // Channels of the desired trajectory.
+  const struct impromptu_channel *desired;
+  // Number of desired channels.
+  uint32_t desired_count;
+  // Channels of the measured state.
+  const struct impromptu_channel *measured;
+  // Number of measured channels.
+  uint32_t measured_count;
+  // Channels of the reference.
+  const struct impromptu_channel *reference;
+  // Number of reference channels.
+  uint32_t reference_count;
+} impromptu_signals;
+
+// What an adapter has done.
+typedef struct impromptu_report {
+  // Correction of each output of the model in the last tick, in the channel's unit.
+  float correction[IMPROMPTU_MAX_OUTPUTS];
+  // How far the network lane is faded in, 0..1.
+  float network_weight;
+  // How far the feedback lane is faded in, 0..1.
+  float feedback_weight;
+  // Ticks in which a limit or the slew bounded the correction.
+  uint32_t saturations;
+  // Inferences that did not come in time.
+  uint32_t late;
+  // Reference tick of the next sample that is pushed.
+  int32_t next_tick;
+} impromptu_report;
+
+// Memory for a flight stack.
+typedef struct impromptu_flight {
+  // Not for the caller.
+  uint64_t words[IMPROMPTU_FLIGHT_WORDS];
+} impromptu_flight;
+
+// Settings of the flight stack.
+typedef struct impromptu_flight_settings {
+  // Mass, kg.
+  float mass;
+  // Principal moments of inertia, kg m^2, body FLU.
+  float inertia[3];
+  // Positions of rotors 1..4 (forward, left), m.
+  float rotors[4][2];
+  // Sign of each rotor's reaction torque about the body's z axis.
+  float directions[4];
+  // Thrust over squared rotor speed, N s^2.
+  float thrust_coefficient;
+  // Reaction torque over squared rotor speed, N m s^2.
+  float torque_coefficient;
+  // Largest rotor speed, rad/s.
+  float max_rotor_speed;
+  // Position error to acceleration, world ENU, 1/s^2.
+  float position_kp[3];
+  // Velocity error to acceleration, 1/s.
+  float position_kd[3];
+  // Integrated position error to acceleration, 1/s^3.
+  float position_ki[3];
+  // Largest acceleration that the integral may ask for, m/s^2.
+  float integral_limit;
+  // Attitude error to angular acceleration, 1/s^2.
+  float attitude_kp;
+  // Body rate to angular acceleration, 1/s.
+  float attitude_kd;
+  // Control ticks (attitude loop) a second.
+  float control_hz;
+  // Control ticks in a tick of the position loop, which is the reference's tick.
+  uint32_t position_divisor;
+} impromptu_flight_settings;
+
+// One sample of the desired trajectory.
+typedef struct impromptu_setpoint {
+  // Position, world ENU, m.
+  float position[3];
+  // Velocity, world ENU, m/s.
+  float velocity[3];
+  // Acceleration, world ENU, m/s^2.
+  float acceleration[3];
+  // Yaw, rad.
+  float yaw;
+} impromptu_setpoint;
+
+// What the flight stack is told about the vehicle.
+typedef struct impromptu_state {
+  // Position, world ENU, m.
+  float position[3];
+  // Velocity, world ENU, m/s.
+  float velocity[3];
+  // Attitude: Hamilton quaternion w, x, y, z, body to world. Need not be normalised.
+  float attitude[4];
+  // Body rates, rad/s, body FLU.
+  float rates[3];
+  // Vertical acceleration in the world frame without gravity, m/s^2; a network input only, 0 if unknown.
+  float vertical_acceleration;
+} impromptu_state;
+
+// What the position loop tracks: the desired state, corrected.
+typedef struct impromptu_reference {
+  // Position, world ENU, m.
+  float position[3];
+  // Velocity, world ENU, m/s.
+  float velocity[3];
+  // Yaw, rad.
+  float yaw;
+} impromptu_reference;
+
+// What a control tick gives.
+typedef struct impromptu_command {
+  // Rotor speeds 1..4 as fractions of the largest speed: always finite, always in 0..1.
+  float motors[4];
+  // The reference that the position loop tracks.
+  struct impromptu_reference reference;
+} impromptu_command;
+
+// Every status.
+#define impromptu_status_ALL { impromptu_status_Ok, impromptu_status_Null, impromptu_status_Misaligned, impromptu_status_Memory, impromptu_status_NotCreated, impromptu_status_Count, impromptu_status_NotFinite, impromptu_status_Text, impromptu_status_Settings, impromptu_status_Nothing, impromptu_status_Damaged, impromptu_status_NotAModel, impromptu_status_Version, impromptu_status_Card, impromptu_status_Shape, impromptu_status_Value, impromptu_status_Overflow, impromptu_status_Probe, impromptu_status_Bounds, impromptu_status_Signals, impromptu_status_Preview, impromptu_status_Rate, impromptu_status_Refused, }
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+// A status in words, with what to do; for any number.
+const char *impromptu_status_text(int32_t status);
+
+// Checks a model file of `length` bytes and creates the model in `model`, which has `size` bytes (sizeof *model).
+//
+// The bytes stay where they are, in flash for instance: they must live and keep unchanged as long as the model. They should start at a multiple of
+// 16 bytes; elsewhere they are read by slower kernels, with the same results. Needs up to 16 KB of stack on a microcontroller; what is not said to need more, 2 KB.
+impromptu_status impromptu_model_create(struct impromptu_model *model,
+                                        size_t size,
+                                        const uint8_t *bytes,
+                                        size_t length);
+
+// What a model says of itself.
+impromptu_status impromptu_model_describe(const struct impromptu_model *model, struct impromptu_description *description);
+
+// Creates the working memory of an evaluation in `scratch`, which has `size` bytes. One is enough for everything that never runs at the
+// same time.
+impromptu_status impromptu_scratch_create(struct impromptu_scratch *scratch,
+                                          size_t size);
+
+// Evaluates the network: the work of a task of lower priority. It touches nothing but its arguments, so that an adapter or flight stack may go
+// on at the same time.
+impromptu_status impromptu_job_run(const struct impromptu_job *job,
+                                   const struct impromptu_model *model,
+                                   struct impromptu_scratch *scratch,
+                                   struct impromptu_inference *inference);
+
+// Bytes of an object as the library was compiled: at most the sizeof of its type in the header. For checks in tests and start-up code.
+size_t impromptu_model_size(void);
+
+// Creates an adapter in `adapter`, which has `size` bytes, for a loop whose references run at `rate_hz`. Both lanes are off.
+//
+// `signals` is compared with the model's table, name by name; NULL takes the model's for the application's. The model must live as
+// long as the adapter. The first sample pushed will be that of reference tick `first_tick`. Needs up to 4 KB of stack.
+impromptu_status impromptu_adapter_create(struct impromptu_adapter *adapter,
+                                          size_t size,
+                                          const struct impromptu_model *model,
+                                          const struct impromptu_signals *signals,
+                                          float rate_hz,
+                                          int32_t first_tick);
+
+// impromptu_adapter_create for the signals of a quadrotor, as the flight stack has them: 10 desired channels (position, velocity,
+// acceleration, yaw), 13 measured (position, velocity, roll, pitch, yaw, body rates, vertical acceleration without gravity), 6
+// references (position, velocity). m, s, rad; world ENU, body FLU, pitch positive nose down.
+impromptu_status impromptu_adapter_create_quadrotor(struct impromptu_adapter *adapter,
+                                                    size_t size,
+                                                    const struct impromptu_model *model,
+                                                    float rate_hz,
+                                                    int32_t first_tick);
+
+// Appends the desired channels of the next reference tick. Push as far ahead as impromptu_description.future says; what is missing
+// is taken as the trajectory's end.
+impromptu_status impromptu_adapter_push(struct impromptu_adapter *adapter,
+                                        const float *desired,
+                                        size_t count);
+
+// Forgets the trajectory, for another one: the next sample pushed will be that of reference tick `first_tick`.
+impromptu_status impromptu_adapter_restart(struct impromptu_adapter *adapter, int32_t first_tick);
+
+// Switches the network lane and the feedback lane on (not 0) or off; they fade in and out over the model's fade time. With both
+// off and faded out the reference is the desired one, to the bit.
+impromptu_status impromptu_adapter_switch(struct impromptu_adapter *adapter, int network, int feedback);
+
+// Gives inferences time until the next reference tick: for a network that is evaluated by a task of lower priority. Once, after
+// impromptu_adapter_create.
+impromptu_status impromptu_adapter_defer(struct impromptu_adapter *adapter);
+
+// A whole reference tick, the network included: takes what is measured and writes the reference that the loop shall track.
+impromptu_status impromptu_adapter_step(struct impromptu_adapter *adapter,
+                                        struct impromptu_scratch *scratch,
+                                        int32_t tick,
+                                        const float *measured,
+                                        size_t measured_count,
+                                        float *reference,
+                                        size_t reference_count);
+
+// First part of a reference tick. Sets `due` to 1 and writes `job` if the network is to be evaluated (impromptu_job_run), else sets it to 0
+// and leaves `job` alone. The inference is given to impromptu_adapter_deliver by whoever calls the adapter, before
+// impromptu_adapter_finish or, after impromptu_adapter_defer, before the next impromptu_adapter_begin.
+impromptu_status impromptu_adapter_begin(struct impromptu_adapter *adapter,
+                                         int32_t tick,
+                                         const float *measured,
+                                         size_t measured_count,
+                                         struct impromptu_job *job,
+                                         int *due);
+
+// Takes what came of the last job; one that is not awaited any more is dropped.
+impromptu_status impromptu_adapter_deliver(struct impromptu_adapter *adapter, const struct impromptu_inference *inference);
+
+// Second part of a reference tick: writes the reference that the loop shall track.
+impromptu_status impromptu_adapter_finish(struct impromptu_adapter *adapter,
+                                          int32_t tick,
+                                          const float *measured,
+                                          size_t measured_count,
+                                          float *reference,
+                                          size_t reference_count);
+
+// Correction, fades, saturations and late inferences.
+impromptu_status impromptu_adapter_report(struct impromptu_adapter *adapter, struct impromptu_report *result);
+
+// Bytes of an adapter as the library was compiled: at most sizeof(impromptu_adapter).
+size_t impromptu_adapter_size(void);
+
+// Creates a flight stack in `flight`, which has `size` bytes, with no add-on. The first setpoint is that of reference tick 0.
+// Needs up to 24 KB of stack.
+impromptu_status impromptu_flight_create(struct impromptu_flight *flight,
+                                         size_t size,
+                                         const struct impromptu_flight_settings *settings);
+
+// Puts an add-on before the loop, with the lanes that are not 0 on. The model must live as long as the flight stack.
+// Needs up to 12 KB of stack.
+impromptu_status impromptu_flight_attach(struct impromptu_flight *flight,
+                                         const struct impromptu_model *model,
+                                         int network,
+                                         int feedback);
+
+// Appends the desired state of the next reference tick, as far ahead as impromptu_description.future says.
+impromptu_status impromptu_flight_push(struct impromptu_flight *flight, const struct impromptu_setpoint *setpoint);
+
+// Switches the network lane and the feedback lane on (not 0) or off.
+impromptu_status impromptu_flight_switch(struct impromptu_flight *flight, int network, int feedback);
+
+// One control tick, the network included. Ticks count from 0. A state that is not finite gives IMPROMPTU_STATUS_NOT_FINITE and no
+// command: what the motors then do is the caller's decision. Needs up to 4 KB of stack.
+impromptu_status impromptu_flight_step(struct impromptu_flight *flight,
+                                       struct impromptu_scratch *scratch,
+                                       uint32_t tick,
+                                       const struct impromptu_state *state,
+                                       struct impromptu_command *command);
+
+// One control tick without the network: the same commands as impromptu_flight_step, if each inference is delivered before the next
+// reference tick. Sets `due` to 1 and writes `job` if the network is to be evaluated (impromptu_job_run), else sets it to 0.
+// Needs up to 4 KB of stack.
+impromptu_status impromptu_flight_control(struct impromptu_flight *flight,
+                                          uint32_t tick,
+                                          const struct impromptu_state *state,
+                                          struct impromptu_command *command,
+                                          struct impromptu_job *job,
+                                          int *due);
+
+// Takes what came of the last job; one that is not awaited any more is dropped.
+impromptu_status impromptu_flight_deliver(struct impromptu_flight *flight, const struct impromptu_inference *inference);
+
+// What the add-on has done; IMPROMPTU_STATUS_NOTHING without one.
+impromptu_status impromptu_flight_report(struct impromptu_flight *flight, struct impromptu_report *result);
+
+// Bytes of a flight stack as the library was compiled: at most sizeof(impromptu_flight).
+size_t impromptu_flight_size(void);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* IMPROMPTU_H */

@@ -1,0 +1,233 @@
+//! The adapter alone, from C.
+
+use core::{ffi::c_int, ptr};
+
+use impromptu_firmware::{
+    adapter::{Adapter, Lanes},
+    model::{Model, SignalTable},
+    network::Scratch,
+    quadrotor,
+};
+
+use super::{Place, channels, create, input, object, report, signals::table, view};
+use crate::{
+    adapter::{EMPTY, Layout, Stage},
+    memory::{AdapterMemory, ModelMemory, Object, ScratchMemory},
+    status::Status,
+    values::{Inference, Job, PREVIEW, Report, Signals},
+};
+
+/// Creates an adapter in `adapter`, which has `size` bytes, for a loop whose references run at `rate_hz`. Both lanes are off.
+///
+/// `signals` is compared with the model's table, name by name; NULL takes the model's for the application's. The model must live as
+/// long as the adapter. The first sample pushed will be that of reference tick `first_tick`. Needs up to 4 KB of stack.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_adapter_create(
+    adapter: *mut AdapterMemory,
+    size: usize,
+    model: *const ModelMemory,
+    signals: *const Signals,
+    rate_hz: f32,
+    first_tick: i32,
+) -> Status {
+    // SAFETY: the module's rules.
+    unsafe {
+        create(adapter, size, |stage| {
+            let model = view::<Model<'static>>(model)?;
+            match signals.is_null() {
+                true => fill(stage, model, &model.card().signals, rate_hz, first_tick),
+                false => fill(stage, model, &table(signals)?, rate_hz, first_tick),
+            }
+        })
+    }
+}
+
+/// impromptu_adapter_create for the signals of a quadrotor, as the flight stack has them: 10 desired channels (position, velocity,
+/// acceleration, yaw), 13 measured (position, velocity, roll, pitch, yaw, body rates, vertical acceleration without gravity), 6
+/// references (position, velocity). m, s, rad; world ENU, body FLU, pitch positive nose down.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_adapter_create_quadrotor(
+    adapter: *mut AdapterMemory,
+    size: usize,
+    model: *const ModelMemory,
+    rate_hz: f32,
+    first_tick: i32,
+) -> Status {
+    // SAFETY: the module's rules.
+    unsafe {
+        create(adapter, size, |stage| fill(stage, view::<Model<'static>>(model)?, &quadrotor::signals(), rate_hz, first_tick))
+    }
+}
+
+/// Makes an adapter where it will live.
+#[inline(never)]
+unsafe fn fill(
+    stage: *mut Stage,
+    model: &'static Model<'static>,
+    table: &SignalTable<'_>,
+    rate_hz: f32,
+    first_tick: i32,
+) -> Result<(), Status> {
+    let layout = Layout::new(table);
+    // SAFETY: memory for an adapter that nobody else uses; all of its fields are written.
+    unsafe {
+        // No `?`: it would put another copy on the stack.
+        match Adapter::new(model, table, rate_hz, PREVIEW) {
+            Ok(adapter) => ptr::addr_of_mut!((*stage).adapter).write(adapter),
+            Err(refusal) => return Err(refusal.into()),
+        }
+        let preview = ptr::addr_of_mut!((*stage).preview);
+        preview.write(EMPTY);
+        (*preview).restart(layout.rules, first_tick);
+        ptr::addr_of_mut!((*stage).layout).write(layout);
+    }
+    Ok(())
+}
+
+/// Appends the desired channels of the next reference tick. Push as far ahead as impromptu_description.future says; what is missing
+/// is taken as the trajectory's end.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_adapter_push(adapter: *mut AdapterMemory, desired: *const f32, count: usize) -> Status {
+    report(|| {
+        // SAFETY: the module's rules.
+        let (adapter, desired) = unsafe { (object::<Stage>(adapter)?, channels(desired, count)?) };
+        adapter.counted([Some(count), None, None])?;
+        adapter.push(desired)
+    })
+}
+
+/// Forgets the trajectory, for another one: the next sample pushed will be that of reference tick `first_tick`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_adapter_restart(adapter: *mut AdapterMemory, first_tick: i32) -> Status {
+    report(|| {
+        // SAFETY: the module's rules.
+        unsafe { object::<Stage>(adapter)?.restart(first_tick) };
+        Ok(())
+    })
+}
+
+/// Switches the network lane and the feedback lane on (not 0) or off; they fade in and out over the model's fade time. With both
+/// off and faded out the reference is the desired one, to the bit.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_adapter_switch(adapter: *mut AdapterMemory, network: c_int, feedback: c_int) -> Status {
+    report(|| {
+        // SAFETY: the module's rules.
+        unsafe { object::<Stage>(adapter)?.switch(Lanes { network: network != 0, feedback: feedback != 0 }) };
+        Ok(())
+    })
+}
+
+/// Gives inferences time until the next reference tick: for a network that is evaluated by a task of lower priority. Once, after
+/// impromptu_adapter_create.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_adapter_defer(adapter: *mut AdapterMemory) -> Status {
+    report(|| {
+        // SAFETY: the module's rules.
+        unsafe { object::<Stage>(adapter)?.defer() };
+        Ok(())
+    })
+}
+
+/// A whole reference tick, the network included: takes what is measured and writes the reference that the loop shall track.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_adapter_step(
+    adapter: *mut AdapterMemory,
+    scratch: *mut ScratchMemory,
+    tick: i32,
+    measured: *const f32,
+    measured_count: usize,
+    reference: *mut f32,
+    reference_count: usize,
+) -> Status {
+    report(|| {
+        let place = Place::new(reference)?;
+        // SAFETY: the module's rules.
+        let (adapter, scratch) = unsafe { (object::<Stage>(adapter)?, object::<Scratch>(scratch)?) };
+        // SAFETY: the module's rules.
+        let measured = unsafe { channels(measured, measured_count)? };
+        adapter.counted([None, Some(measured_count), Some(reference_count)])?;
+        let values = adapter.step(tick, &measured, scratch);
+        // SAFETY: the module's rules.
+        unsafe { place.write_first(&values, reference_count) };
+        Ok(())
+    })
+}
+
+/// First part of a reference tick. Sets `due` to 1 and writes `job` if the network is to be evaluated (impromptu_job_run), else sets it to 0
+/// and leaves `job` alone. The inference is given to impromptu_adapter_deliver by whoever calls the adapter, before
+/// impromptu_adapter_finish or, after impromptu_adapter_defer, before the next impromptu_adapter_begin.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_adapter_begin(
+    adapter: *mut AdapterMemory,
+    tick: i32,
+    measured: *const f32,
+    measured_count: usize,
+    job: *mut Job,
+    due: *mut c_int,
+) -> Status {
+    report(|| {
+        let (place, flag) = (Place::new(job)?, Place::new(due)?);
+        // SAFETY: the module's rules.
+        let (adapter, measured) = unsafe { (object::<Stage>(adapter)?, channels(measured, measured_count)?) };
+        adapter.counted([None, Some(measured_count), None])?;
+        let released = adapter.begin(tick, &measured);
+        // SAFETY: the module's rules.
+        unsafe {
+            flag.write(c_int::from(released.is_some()));
+            if let Some(released) = &released {
+                place.write_job(released);
+            }
+        }
+        Ok(())
+    })
+}
+
+/// Takes what came of the last job; one that is not awaited any more is dropped.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_adapter_deliver(adapter: *mut AdapterMemory, inference: *const Inference) -> Status {
+    report(|| {
+        // SAFETY: the module's rules.
+        let (adapter, inference) = unsafe { (object::<Stage>(adapter)?, input(inference)?) };
+        adapter.deliver(inference.into());
+        Ok(())
+    })
+}
+
+/// Second part of a reference tick: writes the reference that the loop shall track.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_adapter_finish(
+    adapter: *mut AdapterMemory,
+    tick: i32,
+    measured: *const f32,
+    measured_count: usize,
+    reference: *mut f32,
+    reference_count: usize,
+) -> Status {
+    report(|| {
+        let place = Place::new(reference)?;
+        // SAFETY: the module's rules.
+        let (adapter, measured) = unsafe { (object::<Stage>(adapter)?, channels(measured, measured_count)?) };
+        adapter.counted([None, Some(measured_count), Some(reference_count)])?;
+        let values = adapter.finish(tick, &measured);
+        // SAFETY: the module's rules.
+        unsafe { place.write_first(&values, reference_count) };
+        Ok(())
+    })
+}
+
+/// Correction, fades, saturations and late inferences.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_adapter_report(adapter: *mut AdapterMemory, result: *mut Report) -> Status {
+    report(|| {
+        let place = Place::new(result)?;
+        // SAFETY: the module's rules.
+        unsafe { place.write(object::<Stage>(adapter)?.report()) };
+        Ok(())
+    })
+}
+
+/// Bytes of an adapter as the library was compiled: at most sizeof(impromptu_adapter).
+#[unsafe(no_mangle)]
+pub extern "C" fn impromptu_adapter_size() -> usize {
+    size_of::<Object<Stage>>()
+}

@@ -1,0 +1,4 @@
+/* The part of the Crazyflie firmware's interface that the example uses, in its documented names: enough to compile and test against. */
+#pragma once
+#include <stdint.h>
+void vTaskDelay(uint32_t ticks);

@@ -1,0 +1,286 @@
+//! The C face: its header is up to date, strict compilers accept it, and C programs get the bits of Rust.
+
+use std::{
+    env, fs,
+    path::{Path, PathBuf},
+    process::Command,
+    time::Duration,
+};
+
+use impromptu_firmware::{
+    adapter::{Adapter, Lanes},
+    flight::{Flight, PREVIEW},
+    model::Model,
+    network::Scratch,
+    preview::Preview,
+    quadrotor::{self, DESIRED, MEASURED, REFERENCE},
+    replay::{Event, HEADER, Header, RECORD},
+    types::{State, Tick},
+};
+use impromptu_model_export::Precision;
+use impromptu_tests::{
+    c::{self, Machine},
+    golden,
+};
+
+use crate::board::{flight, model};
+
+/// 12 s: lanes come and go, the trajectory turns.
+const TICKS: u32 = 6_000;
+const TIMEOUT: Duration = Duration::from_secs(120);
+
+/// An empty folder for the test `name`.
+fn folder(name: &str) -> PathBuf {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    if folder.exists() {
+        fs::remove_dir_all(&folder).unwrap();
+    }
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+#[test]
+fn the_header_says_what_the_source_says() {
+    let folder = c::crate_folder();
+    let config = cbindgen::Config::from_file(folder.join("cbindgen.toml")).unwrap();
+    let mut builder = cbindgen::Builder::new().with_config(config);
+    for file in ["status", "memory", "values", "edge/model", "edge/adapter", "edge/flight"] {
+        builder = builder.with_src(folder.join("src").join(file).with_extension("rs"));
+    }
+    let mut header = Vec::new();
+    builder.generate().unwrap().write(&mut header);
+    let path = c::include().join("impromptu.h");
+    if golden::updating() {
+        fs::write(&path, &header).unwrap();
+    }
+    let committed = fs::read(&path).unwrap_or_default();
+    assert!(committed == header, "{} is out of date; {}=1 writes it", path.display(), golden::UPDATE_VARIABLE);
+}
+
+#[test]
+fn strict_compilers_of_c_and_cpp_accept_the_header() {
+    let source = folder("c-header").join("header.c");
+    fs::write(&source, "#include \"impromptu.h\"\nint nothing(void);\nint nothing(void) { return IMPROMPTU_STATUS_OK; }\n")
+        .unwrap();
+    let languages: [(Command, &[&str]); 5] = [
+        (Machine::Host.compiler(), &["-std=c99"]),
+        (Machine::Host.compiler(), &["-std=c11"]),
+        (Machine::Board.compiler(), &["-std=c99"]),
+        // Enumerations of other sizes must not change the interface.
+        (Machine::Board.compiler(), &["-std=gnu11", "-fno-short-enums"]),
+        (Command::new("c++"), &["-x", "c++", "-std=c++11"]),
+    ];
+    for (mut compiler, language) in languages {
+        c::finished(compiler.args(language).args(c::STRICT).arg("-I").arg(c::include()).arg("-fsyntax-only").arg(&source))
+            .unwrap();
+    }
+}
+
+/// What the C program reads, and what it must answer: the recorded flight, flown again with numbers as they cross the C face.
+fn script(file: &[u8]) -> (Vec<u8>, Vec<u8>) {
+    let model = Model::from_bytes(file).unwrap();
+    let switches = |tick| match tick {
+        1_003 => Some(Event::Lanes(Lanes::BOTH)),
+        3_333 => Some(Event::Lanes(Lanes { network: false, feedback: true })),
+        4_000 => Some(Event::Lanes(Lanes::NONE)),
+        4_555 => Some(Event::Lanes(Lanes { network: true, feedback: false })),
+        _ => None,
+    };
+    let recording = flight::fly(Some((&model, Lanes::NONE)), TICKS, switches).recording;
+    let (header, records) = recording.split_first_chunk::<HEADER>().unwrap();
+    let settings = Header::from_bytes(header).unwrap().settings;
+
+    let mut flight = Flight::new(&settings).unwrap();
+    flight.attach(&model, &settings, Lanes::NONE).unwrap();
+    let rate = settings.rates.reference_hz();
+    let mut adapter = Adapter::<DESIRED, MEASURED, REFERENCE>::new(&model, &quadrotor::signals(), rate, PREVIEW).unwrap();
+    adapter.defer();
+    let mut preview = Preview::<DESIRED, PREVIEW>::new(quadrotor::end_rules(), 0);
+    let mut scratch = Scratch::new();
+
+    let (mut script, mut answers) = (Vec::new(), Vec::new());
+    script.extend(TICKS.to_le_bytes());
+    script.extend((file.len() as u32).to_le_bytes());
+    let impromptu_firmware::control::Airframe { mass, inertia, rotors, directions, .. } = settings.airframe;
+    let airframe =
+        [settings.airframe.thrust_coefficient, settings.airframe.torque_coefficient, settings.airframe.max_rotor_speed];
+    let position = settings.position;
+    floats(&mut script, [mass].iter().chain(&inertia).chain(rotors.as_flattened()).chain(&directions).chain(&airframe));
+    floats(&mut script, position.kp.iter().chain(&position.kd).chain(&position.ki).chain([&position.integral_limit]));
+    floats(&mut script, &[settings.attitude.kp, settings.attitude.kd, settings.rates.control_hz]);
+    script.extend(settings.rates.position_divisor.to_le_bytes());
+    script.extend(file);
+
+    let (mut lanes, mut setpoints, mut tick) = (0u32, Vec::new(), 0);
+    for record in records.as_chunks::<RECORD>().0 {
+        let event = Event::from_bytes(record).unwrap();
+        event.prepare(&mut flight);
+        match event {
+            Event::Lanes(Lanes { network, feedback }) => {
+                lanes = 4 | u32::from(network) | u32::from(feedback) << 1;
+                adapter.switch(Lanes { network, feedback });
+            }
+            Event::Setpoint(setpoint) => {
+                setpoints.push(quadrotor::desired(&setpoint));
+                preview.push(quadrotor::desired(&setpoint));
+            }
+            Event::Tick(state) => {
+                script.extend(lanes.to_le_bytes());
+                script.extend((setpoints.len() as u32).to_le_bytes());
+                setpoints.iter().for_each(|setpoint| floats(&mut script, setpoint));
+                (lanes, setpoints) = (0, Vec::new());
+                let q = state.attitude.quaternion();
+                let attitude = [q.w, q.i, q.j, q.k];
+                let (p, v, w): ([f32; 3], [f32; 3], [f32; 3]) =
+                    (state.position.into(), state.velocity.into(), state.rates.into());
+                let mut numbers = [0.0; 14];
+                for (place, number) in numbers.iter_mut().zip(p.iter().chain(&v).chain(&attitude).chain(&w)) {
+                    *place = *number;
+                }
+                floats(&mut script, &numbers);
+
+                let state = State::from_raw(p, v, attitude, w).unwrap();
+                let command = flight.step(Tick(tick), &state, &mut scratch);
+                let reference = flight.reference();
+                floats(&mut answers, &command.fractions());
+                floats(&mut answers, reference.position.iter().chain(&reference.velocity).chain([&reference.yaw]));
+                if tick.is_multiple_of(settings.rates.position_divisor) {
+                    let reference_tick = (tick / settings.rates.position_divisor) as i32;
+                    let measured = std::array::from_fn(|channel| numbers[channel]);
+                    let reference = adapter.step(reference_tick, &preview, &measured, &mut scratch);
+                    floats(&mut answers, reference.iter().chain(adapter.correction()).chain(&adapter.weights()));
+                    answers.extend(
+                        [adapter.saturations(), adapter.late(), preview.next_tick() as u32].map(u32::to_le_bytes).as_flattened(),
+                    );
+                }
+                tick += 1;
+            }
+            Event::Excitation(_) | Event::End { .. } => {}
+        }
+    }
+    assert_eq!(tick, TICKS);
+    (script, answers)
+}
+
+fn floats<'a>(bytes: &mut Vec<u8>, numbers: impl IntoIterator<Item = &'a f32>) {
+    numbers.into_iter().for_each(|number| bytes.extend(number.to_le_bytes()));
+}
+
+#[test]
+fn a_c_program_gets_the_bits_of_rust_here_and_on_the_emulated_board() {
+    let file = model::file(&model::TANH, Precision::Int8);
+    let (script, expected) = script(&file);
+    for (machine, name) in [(Machine::Host, "c-host"), (Machine::Board, "c-board")] {
+        let folder = folder(name);
+        fs::write(folder.join("script.bin"), &script).unwrap();
+        let program = machine.program(&folder, &[], &["flight.c"]).unwrap();
+        let sizes = machine.run(&program, &folder, TIMEOUT).unwrap();
+        let answers = fs::read(folder.join("answers.bin")).unwrap();
+        let differs = answers.iter().zip(&expected).position(|(a, b)| a != b);
+        assert!(
+            differs.is_none() && answers.len() == expected.len(),
+            "{name}: byte {differs:?}, {} of {}",
+            answers.len(),
+            expected.len()
+        );
+        // The header's sizes are not much larger than needed: the caller pays for them.
+        let sizes: serde_json::Value = serde_json::from_str(&sizes).unwrap();
+        assert!(sizes["adapter"].as_u64().unwrap() > 12_288, "{sizes}");
+        println!("{name}: {sizes}");
+    }
+}
+
+/// The model as the example's Kbuild file puts it into the program.
+fn model_source(folder: &Path, file: &[u8]) -> PathBuf {
+    let (model, source) = (folder.join("flown.model"), folder.join("model.s"));
+    fs::write(&model, file).unwrap();
+    let kbuild = fs::read_to_string(c::crate_folder().join("examples/crazyflie/src/Kbuild")).unwrap();
+    let line = kbuild.lines().find(|line| line.contains("printf '")).unwrap();
+    let text = line.split('\'').nth(1).unwrap().replace("\\n", "\n").replace("%s", model.to_str().unwrap());
+    fs::write(&source, text).unwrap();
+    source
+}
+
+#[test]
+fn the_crazyflie_controller_corrects_setpoints_and_converts_degrees_and_pitch() {
+    let file = model::file(&model::TANH, Precision::Int8);
+    let folder = folder("c-crazyflie");
+    let source = model_source(&folder, &file);
+    let example = c::crate_folder().join("examples/crazyflie/src");
+    let interface = c::programs().join("crazyflie-interface");
+    let includes = [&example, &interface].map(|path| format!("-I{}", path.display()));
+    // As the Crazyflie's firmware is compiled; bits are compared, so products are rounded before they are added.
+    let flags = ["-std=gnu11", "-fno-math-errno", "-mfp16-format=ieee", "-ffp-contract=off", &includes[0], &includes[1]];
+    let program = Machine::Board.program(&folder, &flags, &["crazyflie.c", source.to_str().unwrap()]).unwrap();
+    let report = Machine::Board.run(&program, &folder, TIMEOUT).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let answers: Vec<f32> =
+        fs::read(folder.join("answers.bin")).unwrap().as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+    let (told, measured) = answers.split_at(answers.len() - MEASURED);
+
+    // Rolled to the right, nose up, turned to the right; rates about right-handed axes.
+    let radians = |degrees: f32| degrees * (std::f32::consts::PI / 180.0);
+    let angles = [20.0, -10.0, -30.0].map(radians);
+    let rates = [90.0, -45.0, 180.0].map(radians);
+    assert_eq!(measured[..6], [0.01, 0.02, 1.03, 0.4, -0.2, 0.1]);
+    assert_eq!((&measured[6..9], &measured[9..12], measured[12]), (&angles[..], &rates[..], 0.5 * 9.81));
+
+    // The same line through an adapter in Rust.
+    let model = Model::from_bytes(&file).unwrap();
+    let mut adapter = Adapter::<DESIRED, MEASURED, REFERENCE>::new(&model, &quadrotor::signals(), 100.0, PREVIEW).unwrap();
+    adapter.defer();
+    adapter.switch(Lanes::BOTH);
+    let mut preview = Preview::<DESIRED, PREVIEW>::new(quadrotor::end_rules(), 0);
+    let line = |tick: i32| {
+        let time = (tick as f32 / 100.0).min(2.0);
+        let (starts, time) = if time > 1.0 { ([0.5, -0.25, 1.125, 0.5], time - 1.0) } else { ([0.0, 0.0, 1.0, 0.0], time) };
+        let speeds = [0.5, -0.25, 0.125, 0.5];
+        let at: [f32; 4] = std::array::from_fn(|axis| starts[axis] + speeds[axis] * time);
+        let moves = if tick > 200 { 0.0 } else { 1.0 };
+        let [vx, vy, vz, _] = speeds.map(|speed| speed * moves);
+        [at[0], at[1], at[2], vx, vy, vz, 0.0, 0.0, 0.0, at[3]]
+    };
+    let future = model.card().preview_span().1 as i32;
+    (0..=future).for_each(|tick| preview.push(line(tick)));
+    let (mut scratch, mut moved) = (Scratch::new(), false);
+    let ticks = told.as_chunks::<7>().0;
+    assert!(ticks.len() > 270 && report["ticks"] == ticks.len(), "{report}");
+    let measured: [f32; MEASURED] = measured.try_into().unwrap();
+    for (tick, told) in (0..).zip(ticks) {
+        preview.push(line(tick + future + 1));
+        let reference = adapter.step(tick, &preview, &measured, &mut scratch);
+        assert_eq!(told[..6].iter().map(|x| x.to_bits()).collect::<Vec<_>>(), reference.map(f32::to_bits), "tick {tick}");
+        assert!((told[6].to_radians() - line(tick)[9]).abs() < 1e-5);
+        moved |= (reference[0] - line(tick)[0]).abs() > 0.01;
+    }
+    assert!(moved && adapter.late() == 0, "the correction was flown");
+}
+
+/// Bytes of stack that each call may need on the microcontroller; the header and the Crazyflie's example tell these.
+#[test]
+fn calls_from_c_need_no_more_stack_than_the_header_says() {
+    let folder = folder("c-stack");
+    let source = model_source(&folder, &model::file(&model::TANH, Precision::Int8));
+    let program = Machine::Board.program(&folder, &[], &["stack.c", source.to_str().unwrap()]).unwrap();
+    let used = Machine::Board.run(&program, &folder, TIMEOUT).unwrap();
+    println!("{used}");
+    let used: serde_json::Map<String, serde_json::Value> = serde_json::from_str(&used).unwrap();
+    let header = fs::read_to_string(c::include().join("impromptu.h")).unwrap();
+    for (call, kilobytes) in
+        [("model_create", 16), ("adapter_create", 4), ("flight_create", 24), ("flight_attach", 12), ("flight_control", 4)]
+    {
+        let prototype = header.find(&format!("impromptu_{call}(")).unwrap();
+        let comment = &header[header[..prototype].rfind("\n\n").unwrap()..prototype];
+        assert!(comment.contains(&format!("{kilobytes} KB of stack")), "{call}: {comment}");
+    }
+    for (call, bytes) in &used {
+        let limit = match call.as_str() {
+            "model_create" => 16_384,
+            "adapter_create" | "flight_control" => 4_096,
+            "flight_create" => 24_576,
+            "flight_attach" => 12_288,
+            _ => 2_048,
+        };
+        assert!(bytes.as_u64().unwrap() <= limit, "{call} needs {bytes} bytes of stack");
+    }
+}
