@@ -1,9 +1,11 @@
 //! The add-on: corrects the references of any stable loop.
 //!
 //! *in* desired channels (pushed ahead of time) and measured channels, at every reference tick; *out* the reference channels;
-//! *never* a correction beyond the model's limits and slew, never any change of the desired reference when both lanes are off;
+//! *never* a correction beyond the model's limits and slew, never any change of the desired reference when both lanes are off, be it by the
+//! user or by the [guard](crate::guard);
 //! *source* Zhou 2017, Fig. 1. What differs: the correction is ramped between sub-rate ticks, and a feedback lane adds to it.
 
+mod correction;
 mod inference;
 mod ramp;
 mod signals;
@@ -11,15 +13,17 @@ mod signals;
 use crate::{
     features,
     feedback::AxisState,
+    guard::{Findings, Guard, GuardSettings, finite},
     math::{clamp, finite_or_zero},
     model::{Interpolation, MAX_AXES, MAX_ERRORS, MAX_FEATURES, MAX_OUTPUTS, Model, Refusal, SignalTable},
     network::Scratch,
     preview::{EndRule, Preview},
 };
 
+use correction::{Correction, Wanted};
 pub use inference::{Inference, Job};
 use ramp::Ramp;
-use signals::{History, View, base_channels, same_signals};
+use signals::{History, View, base_channels, matched_error, same_signals};
 
 /// Sub-rate ticks of measured and reference history that features can read.
 pub const HISTORY: usize = 16;
@@ -59,12 +63,13 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
     /// Whether an inference may take up to the next reference tick.
     deferred: bool,
     axes: [AxisState; MAX_AXES],
+    /// Lanes that are wanted.
     lanes: Lanes,
+    guard: Guard,
     /// How far each lane is faded in, 0..=1.
     network_weight: f32,
     feedback_weight: f32,
-    correction: [f32; MAX_OUTPUTS],
-    saturations: u32,
+    correction: Correction,
     loop_gain: f32,
     /// Recent peak of what is desired of the loop and of its errors ([`crate::model::Authority`]).
     vigour: f32,
@@ -98,10 +103,10 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             deferred: false,
             axes: [AxisState::REST; MAX_AXES],
             lanes: Lanes::NONE,
+            guard: Guard::new(GuardSettings::default(), rate),
             network_weight: 0.0,
             feedback_weight: 0.0,
-            correction: [0.0; MAX_OUTPUTS],
-            saturations: 0,
+            correction: Correction::NONE,
             loop_gain: 1.0,
             vigour: 0.0,
         })
@@ -115,6 +120,27 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     /// Switches lanes; they are faded in and out over the model's fade time.
     pub fn switch(&mut self, lanes: Lanes) {
         self.lanes = lanes;
+        self.guard.switched(lanes);
+    }
+
+    /// Which lanes the guard lets act, its trips and its evidence.
+    pub fn guard(&self) -> &Guard {
+        &self.guard
+    }
+
+    /// Sets the guard, which is on with [`GuardSettings::default`] from the start.
+    pub fn set_guard(&mut self, settings: GuardSettings) {
+        self.guard.set(settings);
+    }
+
+    /// Lets lanes act again that the guard has locked out.
+    pub fn rearm(&mut self) {
+        self.guard.rearm();
+    }
+
+    /// Tells how many reference ticks ago the newest measurement arrived; 0 from the start.
+    pub fn set_age(&mut self, ticks: u16) {
+        self.guard.set_age(ticks);
     }
 
     /// Multiplies what the loop receives of the feedback lane, unknown to the lane: the loop gain of a robustness test. 1 in flight.
@@ -124,12 +150,12 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
 
     /// Correction of each output of the model in the last tick.
     pub fn correction(&self) -> &[f32; MAX_OUTPUTS] {
-        &self.correction
+        &self.correction.values
     }
 
     /// Ticks in which a limit or the slew bounded the correction.
     pub fn saturations(&self) -> u32 {
-        self.saturations
+        self.correction.saturations
     }
 
     /// Gives inferences time until the next reference tick. A ramped correction is the same as before: it starts from what was
@@ -174,6 +200,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.align(tick.div_euclid(divisor), measured, &base);
         if !(self.lanes.network || self.network_weight > 0.0) || self.model.network().is_none() {
             self.ramp.clear();
+            self.guard.no_features();
             return None;
         }
         let card = self.model.card();
@@ -184,6 +211,8 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         let mut job = Job { tick, inputs: [0.0; MAX_FEATURES] };
         let view = View { desired: preview, measured: &self.measured, references: &self.references, divisor };
         features::evaluate(&card.features, &view, tick.wrapping_add(ahead), divisor, &mut job.inputs);
+        let (inputs, _) = job.inputs.split_at_checked(card.features.len()).unwrap_or_default();
+        self.guard.features(inputs, &self.model.envelope());
         self.ramp.release(tick);
         Some(job)
     }
@@ -195,18 +224,33 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
 
     /// Second part of a reference tick: the reference that the loop shall track.
     pub fn finish<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M]) -> [f32; R] {
-        let mut reference = self.base_reference(tick, preview);
+        let desired = preview.sample(tick);
+        let mut reference = self.base.map(|channel| desired.get(channel).copied().unwrap_or(0.0));
         let network = self.network(tick);
+        self.guard
+            .judge(self.lanes, Findings { not_finite: !(finite(measured) && finite(&desired)), late: self.ramp.late_in_a_row() });
         self.fade();
-        let feedback = self.feedback(tick, preview, measured);
-        // The slew may need longer than the fade: off is when nothing is left.
-        let left = self.correction.iter().any(|correction| *correction != 0.0);
-        if left || self.network_weight > 0.0 || self.feedback_weight > 0.0 {
-            self.apply(&mut reference, &network, &feedback);
+        let errors = self.errors(tick, preview, measured);
+        let wanted = Wanted {
+            network,
+            feedback: self.feedback(tick, preview, &errors),
+            network_weight: self.network_weight,
+            feedback_weight: self.feedback_weight,
+            loop_gain: self.loop_gain,
+        };
+        let card = self.model.card();
+        let acting = self.correction.left() || self.network_weight > 0.0 || self.feedback_weight > 0.0;
+        let applied =
+            if acting { self.correction.apply(card, &wanted, &mut reference) } else { self.correction.clear(card, &wanted) };
+        self.settle(&applied.feedback);
+        if acting || self.lanes != Lanes::NONE {
+            self.guard.excess(applied.excess);
+            if let Some(monitor) = self.model.monitor() {
+                let errors = self.monitored(tick, preview, measured, &errors);
+                self.guard.observe(monitor, &errors, &applied.shares);
+            }
         } else {
-            // Not even an addition of zero: the baseline's bits.
-            self.correction = [0.0; MAX_OUTPUTS];
-            self.settle(&[0.0; MAX_AXES]);
+            self.guard.restart();
         }
         if self.feedback_weight == 0.0 {
             self.axes.iter_mut().for_each(AxisState::release);
@@ -226,11 +270,23 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     fn fade(&mut self) {
         let ticks = self.model.card().timing.fade_ticks;
         let step = if ticks == 0 { 1.0 } else { 1.0 / f32::from(ticks) };
-        let approach = |weight: f32, on: bool| clamp(if on { weight + step } else { weight - step }, 0.0, 1.0);
+        let allowed = self.guard.allowed(self.lanes);
+        let handover = step.max(self.guard.handover_step());
+        let approach = |weight: f32, on: bool, tripped: bool| {
+            let change = if on {
+                step
+            } else if tripped {
+                -handover
+            } else {
+                -step
+            };
+            clamp(weight + change, 0.0, 1.0)
+        };
         // The network lane has a value from its first sub-rate tick on: a fade that began before would end in a step.
-        let network = self.lanes.network && self.ramp.current() && self.model.network().is_some();
-        self.network_weight = approach(self.network_weight, network);
-        self.feedback_weight = approach(self.feedback_weight, self.lanes.feedback && self.model.lane().is_some());
+        let network = allowed.network && self.ramp.current() && self.model.network().is_some();
+        let tripped = [self.lanes.network && !allowed.network, self.lanes.feedback && !allowed.feedback];
+        self.network_weight = approach(self.network_weight, network, tripped[0]);
+        self.feedback_weight = approach(self.feedback_weight, allowed.feedback && self.model.lane().is_some(), tripped[1]);
     }
 
     /// The reference without any correction.
@@ -257,6 +313,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             self.references = History::new([EndRule::Hold; R], sub_tick.wrapping_sub(1));
             self.references.push(*base);
             self.ramp.clear();
+            self.guard.restart();
         }
         self.measured.push(measured.map(finite_or_zero));
     }
@@ -275,60 +332,57 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         1.0 / (1.0 + self.vigour * self.vigour)
     }
 
-    /// The feedback lane's output on each of its axes.
-    fn feedback<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M]) -> [f32; MAX_AXES] {
-        let mut outputs = [0.0; MAX_AXES];
-        let Some(lane) = self.model.lane() else { return outputs };
-        let timing = &self.model.card().timing;
-        let dt = 1.0 / timing.reference_rate_hz;
-        let whole = timing.measurement_delay_ticks as i32;
-        let share = timing.measurement_delay_ticks - whole as f32;
-        let engaged = self.lanes.feedback && self.feedback_weight > 0.0;
+    /// Errors of each axis of the feedback lane.
+    fn errors<const N: usize>(&self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M]) -> [[f32; MAX_ERRORS]; MAX_AXES] {
         let mut errors = [[0.0; MAX_ERRORS]; MAX_AXES];
+        let Some(lane) = self.model.lane() else { return errors };
+        let delay = self.model.card().timing.measurement_delay_ticks;
         for (axis, errors) in lane.axes().iter().zip(&mut errors) {
-            for (error, &(measured_channel, desired_channel)) in errors.iter_mut().zip(&axis.layout().errors) {
-                let channel = usize::from(desired_channel);
-                let newer = preview.channel(tick.wrapping_sub(whole), channel);
-                let older = preview.channel(tick.wrapping_sub(whole + 1), channel);
-                let then = newer + (older - newer) * share;
-                *error = measured.get(usize::from(measured_channel)).copied().unwrap_or(then) - then;
+            for (error, channels) in errors.iter_mut().zip(&axis.layout().errors) {
+                *error = matched_error(tick, delay, preview, measured, *channels);
             }
         }
-        let authority = self.authority(tick, preview, &errors);
-        for (((axis, state), errors), output) in lane.axes().iter().zip(&mut self.axes).zip(errors).zip(&mut outputs) {
-            *output = state.step(lane, axis, errors, authority, dt, engaged);
-        }
-        outputs
+        errors
     }
 
-    /// Adds both lanes within limits and slew, and tells the feedback lane what was applied of it.
-    fn apply(&mut self, reference: &mut [f32; R], network: &[f32; MAX_OUTPUTS], feedback: &[f32; MAX_AXES]) {
-        let card = self.model.card();
-        let mut wanted = network.map(|value| value * self.network_weight);
-        let axes = card.lane.iter().flat_map(|lane| &lane.axes);
-        for (axis, value) in axes.clone().zip(feedback) {
-            if let Some(wanted) = wanted.get_mut(usize::from(axis.output)) {
-                *wanted += value * self.feedback_weight * self.loop_gain;
-            }
+    /// Errors of each axis of the monitor, most of which the feedback lane has already.
+    fn monitored<const N: usize>(
+        &self,
+        tick: i32,
+        preview: &Preview<D, N>,
+        measured: &[f32; M],
+        known: &[[f32; MAX_ERRORS]; MAX_AXES],
+    ) -> [f32; MAX_AXES] {
+        let mut errors = [0.0; MAX_AXES];
+        let Some(monitor) = self.model.monitor() else { return errors };
+        let delay = self.model.card().timing.measurement_delay_ticks;
+        let lane = self.model.lane().map_or(&[][..], |lane| lane.axes());
+        for (index, ((axis, _), error)) in monitor.axes().iter().zip(&mut errors).enumerate() {
+            let same = lane.get(index).is_some_and(|lane| lane.layout().errors.first() == Some(&axis.error));
+            *error = match known.get(index) {
+                Some([first, ..]) if same => *first,
+                _ => matched_error(tick, delay, preview, measured, axis.error),
+            };
         }
-        let mut excess = [0.0; MAX_OUTPUTS];
-        let mut saturated = false;
-        let places = self.correction.iter_mut().zip(&wanted).zip(&mut excess);
-        for (output, ((correction, &wanted), excess)) in card.outputs.iter().zip(places) {
-            let slewed = clamp(wanted, *correction - output.slew, *correction + output.slew);
-            *correction = clamp(slewed, -output.limit, output.limit);
-            *excess = *correction - wanted;
-            saturated |= *excess != 0.0;
-            if let Some(channel) = reference.get_mut(usize::from(output.channel)) {
-                *channel += *correction;
-            }
+        errors
+    }
+
+    /// The feedback lane's output on each of its axes.
+    fn feedback<const N: usize>(
+        &mut self,
+        tick: i32,
+        preview: &Preview<D, N>,
+        errors: &[[f32; MAX_ERRORS]; MAX_AXES],
+    ) -> [f32; MAX_AXES] {
+        let mut outputs = [0.0; MAX_AXES];
+        let Some(lane) = self.model.lane() else { return outputs };
+        let dt = 1.0 / self.model.card().timing.reference_rate_hz;
+        let engaged = self.guard.allowed(self.lanes).feedback && self.feedback_weight > 0.0;
+        let authority = self.authority(tick, preview, errors);
+        for (((axis, state), errors), output) in lane.axes().iter().zip(&mut self.axes).zip(errors).zip(&mut outputs) {
+            *output = state.step(lane, axis, *errors, authority, dt, engaged);
         }
-        self.saturations = self.saturations.saturating_add(u32::from(saturated));
-        let mut applied = [0.0; MAX_AXES];
-        for ((axis, value), applied) in axes.zip(feedback).zip(&mut applied) {
-            *applied = value * self.feedback_weight + excess.get(usize::from(axis.output)).copied().unwrap_or(0.0);
-        }
-        self.settle(&applied);
+        outputs
     }
 
     fn settle(&mut self, applied: &[f32; MAX_AXES]) {

@@ -55,6 +55,7 @@ impl<'a> Pilot<'a> {
             flight.attach(model, settings, lanes)?;
             if let Some(adapter) = flight.adapter() {
                 adapter.set_loop_gain(plan.loop_gain);
+                adapter.set_guard(plan.guard);
             }
         }
         flight.set_command_delay(ticks(condition.command_delay_s) as u32);
@@ -147,12 +148,13 @@ impl<'a> Pilot<'a> {
         }
     }
 
-    pub(super) fn finish(self) -> FlightRecord {
+    pub(super) fn finish(mut self) -> FlightRecord {
         let scored = self.plan.trajectory.scored.len().max(1) as f64;
         let rms = (self.squares / scored).sqrt();
         FlightRecord {
             // A flight that left the numbers is as bad as can be, not "not a number".
             rms: if rms.is_finite() { rms } else { f64::INFINITY },
+            trips: self.flight.adapter().map(|adapter| adapter.guard().trips()).unwrap_or_default(),
             correction_rms: self.correction_squares.map(|sum| (sum / scored).sqrt()),
             recorded: self.recorder.map(Recorder::finish),
             log: self.plan.log.then(|| FlightLog {

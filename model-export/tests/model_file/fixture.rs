@@ -58,6 +58,7 @@ pub(crate) fn description(window: usize) -> Description {
         outputs: vec![Output { channel: 0, limit: 0.5, slew: 0.1 }, Output { channel: 1, limit: 2.0, slew: 0.5 }],
         envelope: vec![(-3.0, 3.0); window],
         lane: None,
+        monitor: None,
     }
 }
 
