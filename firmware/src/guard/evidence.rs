@@ -75,6 +75,8 @@ pub struct Energies {
     pub network_alone: f32,
     /// Without any correction.
     pub baseline: f32,
+    /// The same over a longer time.
+    pub usual: f32,
 }
 
 /// Errors with and without the lanes.
@@ -99,7 +101,7 @@ impl Evidence {
             head: 0,
             errors: [0.0; MAX_AXES],
             pasts: [[[Past::REST; 3]; MAX_INPUTS]; MAX_AXES],
-            energies: Energies { with: 0.0, without_feedback: 0.0, network_alone: 0.0, baseline: 0.0 },
+            energies: Energies { with: 0.0, without_feedback: 0.0, network_alone: 0.0, baseline: 0.0, usual: 0.0 },
             harmful: [false; 2],
             idle: true,
         }
@@ -157,6 +159,7 @@ impl Evidence {
         let mean = 1.0 / ticks;
         self.head = if self.head == 0 { monitor.taps().saturating_sub(1) } else { self.head - 1 };
         let mut now = Energies::default();
+        let mut acts = false;
         for (((axis, response), pasts), error) in monitor.axes().iter().zip(&mut self.pasts).zip(&mut self.errors) {
             let with = *error * mean;
             *error = 0.0;
@@ -166,6 +169,7 @@ impl Evidence {
                 let (taps, others) = rest.split_at(monitor.taps());
                 rest = others;
                 let responses = pasts.each_mut().map(|past| past.respond(taps, self.head, mean));
+                acts |= pasts[0].quiet == 0;
                 network += responses[0];
                 feedback += responses[1];
                 more += responses[2];
@@ -176,19 +180,25 @@ impl Evidence {
             now.network_alone += (alone + more) * (alone + more);
             now.baseline += (alone - network) * (alone - network);
         }
-        let weight = leak(ticks / (settings.evidence_s * rate_hz));
+        let weight = |seconds: f32| leak(ticks / (seconds * rate_hz));
+        let recent = weight(settings.evidence_s);
         let past = &mut self.energies;
-        for (energy, now) in [
-            (&mut past.with, now.with),
-            (&mut past.without_feedback, now.without_feedback),
-            (&mut past.network_alone, now.network_alone),
-            (&mut past.baseline, now.baseline),
+        for (energy, now, weight) in [
+            (&mut past.with, now.with, recent),
+            (&mut past.without_feedback, now.without_feedback, recent),
+            (&mut past.network_alone, now.network_alone, recent),
+            (&mut past.baseline, now.baseline, recent),
+            (&mut past.usual, now.baseline, weight(settings.usual_s)),
         ] {
             *energy = finite_or_zero(*energy + (now - *energy) * weight);
         }
         let floor = settings.evidence_floor * monitor.promise();
-        let worse =
-            |with: f32, without: f32| with > settings.evidence_factor * settings.evidence_factor * without + floor * floor;
-        self.harmful = [worse(past.network_alone, past.baseline), worse(past.with, past.without_feedback)];
+        let factor = settings.evidence_factor * settings.evidence_factor;
+        let worse = |with: f32, without: f32| with > factor * without + floor * floor;
+        let baseline = if past.usual > past.baseline { past.usual } else { past.baseline };
+        let share = settings.evidence_share * settings.evidence_share * baseline;
+        // While the network acts, what is measured must be worse too.
+        let network = worse(past.network_alone, baseline) && (!acts || worse(past.with, baseline));
+        self.harmful = [network, worse(past.with, past.without_feedback + share)];
     }
 }

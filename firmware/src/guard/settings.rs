@@ -28,10 +28,14 @@ pub struct GuardSettings {
     pub late_in_a_row: u16,
     /// The error with a lane may be this factor of what it would be without,
     pub evidence_factor: f32,
-    /// and besides this many times what the model promises.
+    /// and besides this many times what the model promises,
     pub evidence_floor: f32,
-    /// Time constant of the errors' energies, s.
+    /// and with the feedback lane this share of what it would be without any correction.
+    pub evidence_share: f32,
+    /// Time constant of the errors' energies, s,
     pub evidence_s: f32,
+    /// and of the usual error without any correction, below which none counts as small, s.
+    pub usual_s: f32,
     /// Trips by evidence after which a lane stays off until it is armed again.
     pub evidence_trips: u16,
 }
@@ -51,9 +55,11 @@ impl GuardSettings {
         saturated_share: 0.5,
         saturated_s: 1.0,
         late_in_a_row: 5,
-        evidence_factor: 1.2,
+        evidence_factor: 1.4,
         evidence_floor: 3.0,
+        evidence_share: 0.3,
         evidence_s: 0.5,
+        usual_s: 4.0,
         evidence_trips: 3,
     };
 }
