@@ -6,46 +6,30 @@
 //! *source* Zhou 2017, Fig. 1. What differs: the correction is ramped between sub-rate ticks, and a feedback lane adds to it.
 
 mod correction;
+mod feedback;
 mod inference;
+mod lanes;
 mod ramp;
 mod signals;
 
 use crate::{
     features,
-    feedback::AxisState,
     guard::{Findings, Guard, GuardSettings, finite},
     math::{clamp, finite_or_zero},
-    model::{Interpolation, MAX_AXES, MAX_ERRORS, MAX_FEATURES, MAX_OUTPUTS, Model, Refusal, SignalTable},
+    model::{Interpolation, MAX_FEATURES, MAX_OUTPUTS, Model, Refusal, SignalTable},
     network::Scratch,
     preview::{EndRule, Preview},
 };
 
 use correction::{Correction, Wanted};
+use feedback::Feedback;
 pub use inference::{Inference, Job};
+pub use lanes::Lanes;
 use ramp::Ramp;
-use signals::{History, View, base_channels, matched_error, same_signals};
+use signals::{History, View, base_channels, same_signals};
 
 /// Sub-rate ticks of measured and reference history that features can read.
 pub const HISTORY: usize = 16;
-
-/// Bound of what lowers the feedback lane's authority: a millionth of it is left.
-const VIGOUR_LIMIT: f32 = 1e6;
-
-/// Which lanes act.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Lanes {
-    /// The network lane.
-    pub network: bool,
-    /// The feedback lane.
-    pub feedback: bool,
-}
-
-impl Lanes {
-    /// Both lanes.
-    pub const BOTH: Self = Self { network: true, feedback: true };
-    /// No lane: the loop gets the desired reference, to the bit.
-    pub const NONE: Self = Self { network: false, feedback: false };
-}
 
 /// Adapter for a loop with `D` desired, `M` measured and `R` reference channels.
 ///
@@ -62,7 +46,7 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
     ramp: Ramp,
     /// Whether an inference may take up to the next reference tick.
     deferred: bool,
-    axes: [AxisState; MAX_AXES],
+    feedback: Feedback,
     /// Lanes that are wanted.
     lanes: Lanes,
     guard: Guard,
@@ -71,8 +55,6 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
     feedback_weight: f32,
     correction: Correction,
     loop_gain: f32,
-    /// Recent peak of what is desired of the loop and of its errors ([`crate::model::Authority`]).
-    vigour: f32,
 }
 
 impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
@@ -101,14 +83,13 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             references: History::new([EndRule::Hold; R], i32::MIN),
             ramp: Ramp::EMPTY,
             deferred: false,
-            axes: [AxisState::REST; MAX_AXES],
+            feedback: Feedback::REST,
             lanes: Lanes::NONE,
             guard: Guard::new(GuardSettings::default(), rate),
             network_weight: 0.0,
             feedback_weight: 0.0,
             correction: Correction::NONE,
             loop_gain: 1.0,
-            vigour: 0.0,
         })
     }
 
@@ -230,10 +211,11 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.guard
             .judge(self.lanes, Findings { not_finite: !(finite(measured) && finite(&desired)), late: self.ramp.late_in_a_row() });
         self.fade();
-        let errors = self.errors(tick, preview, measured);
+        let errors = feedback::errors(self.model, tick, preview, measured);
+        let engaged = self.guard.allowed(self.lanes).feedback && self.feedback_weight > 0.0;
         let wanted = Wanted {
             network,
-            feedback: self.feedback(tick, preview, &errors),
+            feedback: self.feedback.step(self.model, tick, preview, &errors, engaged),
             network_weight: self.network_weight,
             feedback_weight: self.feedback_weight,
             loop_gain: self.loop_gain,
@@ -242,18 +224,18 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         let acting = self.correction.left() || self.network_weight > 0.0 || self.feedback_weight > 0.0;
         let applied =
             if acting { self.correction.apply(card, &wanted, &mut reference) } else { self.correction.clear(card, &wanted) };
-        self.settle(&applied.feedback);
+        self.feedback.applied(self.model, &applied.feedback);
         if acting || self.lanes != Lanes::NONE {
             self.guard.excess(applied.excess);
             if let Some(monitor) = self.model.monitor() {
-                let errors = self.monitored(tick, preview, measured, &errors);
+                let errors = feedback::monitored(self.model, tick, preview, measured, &errors);
                 self.guard.observe(monitor, &errors, &applied.shares);
             }
         } else {
             self.guard.restart();
         }
         if self.feedback_weight == 0.0 {
-            self.axes.iter_mut().for_each(AxisState::release);
+            self.feedback.release();
         }
         let divisor = self.divisor();
         if tick.rem_euclid(divisor) == 0 {
@@ -316,80 +298,5 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             self.guard.restart();
         }
         self.measured.push(measured.map(finite_or_zero));
-    }
-
-    /// Share of the fast clamps that the feedback lane may use at this tick, at which its axes have these errors.
-    fn authority<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, errors: &[[f32; MAX_ERRORS]; MAX_AXES]) -> f32 {
-        let Some(layout) = &self.model.card().lane else { return 1.0 };
-        let authority = &layout.authority;
-        let desired = authority.channels.iter().map(|&channel| preview.channel(tick, usize::from(channel)) / authority.scale);
-        let strayed = errors.iter().map(|errors| errors[0] / authority.error_scale);
-        let now = desired.chain(strayed).fold(0.0, |sum, value| sum + value * value);
-        // Also what is no number counts as far astray; the bound lets the lane come back in seconds.
-        let now = if now < VIGOUR_LIMIT { now } else { VIGOUR_LIMIT };
-        let past = self.vigour * authority.decay;
-        self.vigour = if now > past { now } else { past };
-        1.0 / (1.0 + self.vigour * self.vigour)
-    }
-
-    /// Errors of each axis of the feedback lane.
-    fn errors<const N: usize>(&self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M]) -> [[f32; MAX_ERRORS]; MAX_AXES] {
-        let mut errors = [[0.0; MAX_ERRORS]; MAX_AXES];
-        let Some(lane) = self.model.lane() else { return errors };
-        let delay = self.model.card().timing.measurement_delay_ticks;
-        for (axis, errors) in lane.axes().iter().zip(&mut errors) {
-            for (error, channels) in errors.iter_mut().zip(&axis.layout().errors) {
-                *error = matched_error(tick, delay, preview, measured, *channels);
-            }
-        }
-        errors
-    }
-
-    /// Errors of each axis of the monitor, most of which the feedback lane has already.
-    fn monitored<const N: usize>(
-        &self,
-        tick: i32,
-        preview: &Preview<D, N>,
-        measured: &[f32; M],
-        known: &[[f32; MAX_ERRORS]; MAX_AXES],
-    ) -> [f32; MAX_AXES] {
-        let mut errors = [0.0; MAX_AXES];
-        let Some(monitor) = self.model.monitor() else { return errors };
-        let delay = self.model.card().timing.measurement_delay_ticks;
-        let lane = self.model.lane().map_or(&[][..], |lane| lane.axes());
-        for (index, ((axis, _), error)) in monitor.axes().iter().zip(&mut errors).enumerate() {
-            let same = lane.get(index).is_some_and(|lane| lane.layout().errors.first() == Some(&axis.error));
-            *error = match known.get(index) {
-                Some([first, ..]) if same => *first,
-                _ => matched_error(tick, delay, preview, measured, axis.error),
-            };
-        }
-        errors
-    }
-
-    /// The feedback lane's output on each of its axes.
-    fn feedback<const N: usize>(
-        &mut self,
-        tick: i32,
-        preview: &Preview<D, N>,
-        errors: &[[f32; MAX_ERRORS]; MAX_AXES],
-    ) -> [f32; MAX_AXES] {
-        let mut outputs = [0.0; MAX_AXES];
-        let Some(lane) = self.model.lane() else { return outputs };
-        let dt = 1.0 / self.model.card().timing.reference_rate_hz;
-        let engaged = self.guard.allowed(self.lanes).feedback && self.feedback_weight > 0.0;
-        let authority = self.authority(tick, preview, errors);
-        for (((axis, state), errors), output) in lane.axes().iter().zip(&mut self.axes).zip(errors).zip(&mut outputs) {
-            *output = state.step(lane, axis, *errors, authority, dt, engaged);
-        }
-        outputs
-    }
-
-    fn settle(&mut self, applied: &[f32; MAX_AXES]) {
-        if let Some(lane) = self.model.lane() {
-            for (state, &value) in self.axes.iter_mut().zip(applied).take(lane.axes().len()) {
-                state.applied(lane, value);
-            }
-        }
     }
 }

@@ -3,6 +3,7 @@
 //! - [`demo`]: what `cargo run --release` shows, threshold by threshold, and that the README tells the same;
 //! - [`board`]: whole flights on the emulated microcontroller, bit by bit, with golden instruction counts;
 //! - [`decoder`]: mutated model files are refused or flown, never a panic;
+//! - [`guard`]: lanes that do harm are handed over before the error is 1.5 times the baseline's, with numbers;
 //! - [`emulator`]: the emulator is found, fails loudly, and counts repeatably;
 //! - [`mcu`]: what kernels cost on the microcontroller, beside other engines, with a golden table;
 //! - [`kernels`]: the network kernels in assembly give the bits of their portable twin;
@@ -15,6 +16,7 @@ mod board;
 mod decoder;
 mod demo;
 mod emulator;
+mod guard;
 mod kernels;
 mod mcu;
 mod unsafe_code;

@@ -1,0 +1,17 @@
+//! The two lanes, on or off.
+
+/// Which lanes act.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Lanes {
+    /// The network lane.
+    pub network: bool,
+    /// The feedback lane.
+    pub feedback: bool,
+}
+
+impl Lanes {
+    /// Both lanes.
+    pub const BOTH: Self = Self { network: true, feedback: true };
+    /// No lane: the loop gets the desired reference, to the bit.
+    pub const NONE: Self = Self { network: false, feedback: false };
+}
