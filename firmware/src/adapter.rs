@@ -2,8 +2,7 @@
 //!
 //! *in* desired channels (pushed ahead of time) and measured channels, at every reference tick; *out* the reference channels;
 //! *never* a correction beyond the model's limits and slew, never any change of the desired reference when both lanes are off, be it by the
-//! user or by the [guard](crate::guard);
-//! *source* Zhou 2017, Fig. 1. What differs: the correction is ramped between sub-rate ticks, and a feedback lane adds to it.
+//! user or by the [guard](crate::guard); *source* Zhou 2017, Fig. 1. What differs: the correction is ramped between sub-rate ticks, and a feedback lane adds to it.
 
 mod correction;
 mod feedback;
@@ -20,7 +19,6 @@ use crate::{
     network::Scratch,
     preview::{EndRule, Preview},
 };
-
 use correction::{Correction, Wanted};
 use feedback::Feedback;
 pub use inference::{Inference, Job};

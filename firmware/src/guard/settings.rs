@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// When lanes trip and come back. The defaults trip no lane in good flights of the project's validation strokes.
+/// When lanes trip and come back. Those of the evidence trip lanes in validation strokes only where
+/// motors saturate (1.7 times the speed).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GuardSettings {
