@@ -1,49 +1,33 @@
 //! The add-on: corrects the references of any stable loop.
 //!
 //! *in* desired channels (pushed ahead of time) and measured channels, at every reference tick; *out* the reference channels;
-//! *never* a correction beyond the model's limits and slew, never any change of the desired reference when both lanes are off;
-//! *source* Zhou 2017, Fig. 1. What differs: the correction is ramped between sub-rate ticks, and a feedback lane adds to it.
+//! *never* a correction beyond the model's limits and slew, never any change of the desired reference when both lanes are off, be it by the
+//! user or by the [guard](crate::guard); *source* Zhou 2017, Fig. 1. What differs: the correction is ramped between sub-rate ticks, and a feedback lane adds to it.
 
+mod correction;
+mod feedback;
 mod inference;
+mod lanes;
 mod ramp;
 mod signals;
 
-use serde::{Deserialize, Serialize};
-
 use crate::{
     features,
-    feedback::AxisState,
+    guard::{Findings, Guard, GuardSettings, finite},
     math::{clamp, finite_or_zero},
-    model::{Interpolation, MAX_AXES, MAX_ERRORS, MAX_FEATURES, MAX_OUTPUTS, Model, Refusal, SignalTable},
+    model::{Interpolation, MAX_FEATURES, MAX_OUTPUTS, Model, Refusal, SignalTable},
     network::Scratch,
     preview::{EndRule, Preview},
 };
-
+use correction::{Correction, Wanted};
+use feedback::Feedback;
 pub use inference::{Inference, Job};
+pub use lanes::Lanes;
 use ramp::Ramp;
 use signals::{History, View, base_channels, same_signals};
 
 /// Sub-rate ticks of measured and reference history that features can read.
 pub const HISTORY: usize = 16;
-
-/// Bound of what lowers the feedback lane's authority: a millionth of it is left.
-const VIGOUR_LIMIT: f32 = 1e6;
-
-/// Which lanes act.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Lanes {
-    /// The network lane.
-    pub network: bool,
-    /// The feedback lane.
-    pub feedback: bool,
-}
-
-impl Lanes {
-    /// Both lanes.
-    pub const BOTH: Self = Self { network: true, feedback: true };
-    /// No lane: the loop gets the desired reference, to the bit.
-    pub const NONE: Self = Self { network: false, feedback: false };
-}
 
 /// Adapter for a loop with `D` desired, `M` measured and `R` reference channels.
 ///
@@ -60,16 +44,15 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
     ramp: Ramp,
     /// Whether an inference may take up to the next reference tick.
     deferred: bool,
-    axes: [AxisState; MAX_AXES],
+    feedback: Feedback,
+    /// Lanes that are wanted.
     lanes: Lanes,
+    guard: Guard,
     /// How far each lane is faded in, 0..=1.
     network_weight: f32,
     feedback_weight: f32,
-    correction: [f32; MAX_OUTPUTS],
-    saturations: u32,
+    correction: Correction,
     loop_gain: f32,
-    /// Recent peak of what is desired of the loop and of its errors ([`crate::model::Authority`]).
-    vigour: f32,
 }
 
 impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
@@ -98,14 +81,13 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             references: History::new([EndRule::Hold; R], i32::MIN),
             ramp: Ramp::EMPTY,
             deferred: false,
-            axes: [AxisState::REST; MAX_AXES],
+            feedback: Feedback::REST,
             lanes: Lanes::NONE,
+            guard: Guard::new(GuardSettings::default(), rate),
             network_weight: 0.0,
             feedback_weight: 0.0,
-            correction: [0.0; MAX_OUTPUTS],
-            saturations: 0,
+            correction: Correction::NONE,
             loop_gain: 1.0,
-            vigour: 0.0,
         })
     }
 
@@ -114,9 +96,10 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.measured = History::new([EndRule::Hold; M], 0);
         self.references = History::new([EndRule::Hold; R], i32::MIN);
         self.ramp.clear();
-        self.axes = [AxisState::REST; MAX_AXES];
-        (self.network_weight, self.feedback_weight, self.vigour) = (0.0, 0.0, 0.0);
-        self.correction = [0.0; MAX_OUTPUTS];
+        self.feedback = Feedback::REST;
+        (self.network_weight, self.feedback_weight) = (0.0, 0.0);
+        self.correction = Correction { saturations: self.correction.saturations, ..Correction::NONE };
+        self.guard.land();
     }
 
     /// The model that is flown.
@@ -127,6 +110,27 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     /// Switches lanes; they are faded in and out over the model's fade time.
     pub fn switch(&mut self, lanes: Lanes) {
         self.lanes = lanes;
+        self.guard.switched(lanes);
+    }
+
+    /// Which lanes the guard lets act, its trips and its evidence.
+    pub fn guard(&self) -> &Guard {
+        &self.guard
+    }
+
+    /// Sets the guard, which is on with [`GuardSettings::default`] from the start.
+    pub fn set_guard(&mut self, settings: GuardSettings) {
+        self.guard.set(settings);
+    }
+
+    /// Lets lanes act again that the guard has locked out.
+    pub fn rearm(&mut self) {
+        self.guard.rearm();
+    }
+
+    /// Tells how many reference ticks ago the newest measurement arrived; 0 from the start.
+    pub fn set_age(&mut self, ticks: u16) {
+        self.guard.set_age(ticks);
     }
 
     /// Multiplies what the loop receives of the feedback lane, unknown to the lane: the loop gain of a robustness test. 1 in flight.
@@ -136,7 +140,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
 
     /// Correction of each output of the model in the last tick.
     pub fn correction(&self) -> &[f32; MAX_OUTPUTS] {
-        &self.correction
+        &self.correction.values
     }
 
     /// How far the network lane and the feedback lane are faded in, 0..=1.
@@ -146,7 +150,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
 
     /// Ticks in which a limit or the slew bounded the correction.
     pub fn saturations(&self) -> u32 {
-        self.saturations
+        self.correction.saturations
     }
 
     /// Gives inferences time until the next reference tick. A ramped correction is the same as before: it starts from what was
@@ -191,6 +195,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.align(tick.div_euclid(divisor), measured, &base);
         if !(self.lanes.network || self.network_weight > 0.0) || self.model.network().is_none() {
             self.ramp.clear();
+            self.guard.no_features();
             return None;
         }
         let card = self.model.card();
@@ -201,6 +206,8 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         let mut job = Job { tick, inputs: [0.0; MAX_FEATURES] };
         let view = View { desired: preview, measured: &self.measured, references: &self.references, divisor };
         features::evaluate(&card.features, &view, tick.wrapping_add(ahead), divisor, &mut job.inputs);
+        let (inputs, _) = job.inputs.split_at_checked(card.features.len()).unwrap_or_default();
+        self.guard.features(inputs, &self.model.envelope());
         self.ramp.release(tick);
         Some(job)
     }
@@ -212,21 +219,37 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
 
     /// Second part of a reference tick: the reference that the loop shall track.
     pub fn finish<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M]) -> [f32; R] {
-        let mut reference = self.base_reference(tick, preview);
+        let desired = preview.sample(tick);
+        let mut reference = self.base.map(|channel| desired.get(channel).copied().unwrap_or(0.0));
         let network = self.network(tick);
+        self.guard
+            .judge(self.lanes, Findings { not_finite: !(finite(measured) && finite(&desired)), late: self.ramp.late_in_a_row() });
         self.fade();
-        let feedback = self.feedback(tick, preview, measured);
-        // The slew may need longer than the fade: off is when nothing is left.
-        let left = self.correction.iter().any(|correction| *correction != 0.0);
-        if left || self.network_weight > 0.0 || self.feedback_weight > 0.0 {
-            self.apply(&mut reference, &network, &feedback);
+        let errors = feedback::errors(self.model, tick, preview, measured);
+        let engaged = self.guard.allowed(self.lanes).feedback && self.feedback_weight > 0.0;
+        let wanted = Wanted {
+            network,
+            feedback: self.feedback.step(self.model, tick, preview, &errors, engaged),
+            network_weight: self.network_weight,
+            feedback_weight: self.feedback_weight,
+            loop_gain: self.loop_gain,
+        };
+        let card = self.model.card();
+        let acting = self.correction.left() || self.network_weight > 0.0 || self.feedback_weight > 0.0;
+        let applied =
+            if acting { self.correction.apply(card, &wanted, &mut reference) } else { self.correction.clear(card, &wanted) };
+        self.feedback.applied(self.model, &applied.feedback);
+        if acting || self.lanes != Lanes::NONE {
+            self.guard.excess(applied.excess);
+            if let Some(monitor) = self.model.monitor() {
+                let errors = feedback::monitored(self.model, tick, preview, measured, &errors);
+                self.guard.observe(monitor, &errors, &applied.shares);
+            }
         } else {
-            // Not even an addition of zero: the baseline's bits.
-            self.correction = [0.0; MAX_OUTPUTS];
-            self.settle(&[0.0; MAX_AXES]);
+            self.guard.restart();
         }
         if self.feedback_weight == 0.0 {
-            self.axes.iter_mut().for_each(AxisState::release);
+            self.feedback.release();
         }
         let divisor = self.divisor();
         if tick.rem_euclid(divisor) == 0 {
@@ -243,11 +266,23 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     fn fade(&mut self) {
         let ticks = self.model.card().timing.fade_ticks;
         let step = if ticks == 0 { 1.0 } else { 1.0 / f32::from(ticks) };
-        let approach = |weight: f32, on: bool| clamp(if on { weight + step } else { weight - step }, 0.0, 1.0);
+        let allowed = self.guard.allowed(self.lanes);
+        let handover = step.max(self.guard.handover_step());
+        let approach = |weight: f32, on: bool, tripped: bool| {
+            let change = if on {
+                step
+            } else if tripped {
+                -handover
+            } else {
+                -step
+            };
+            clamp(weight + change, 0.0, 1.0)
+        };
         // The network lane has a value from its first sub-rate tick on: a fade that began before would end in a step.
-        let network = self.lanes.network && self.ramp.current() && self.model.network().is_some();
-        self.network_weight = approach(self.network_weight, network);
-        self.feedback_weight = approach(self.feedback_weight, self.lanes.feedback && self.model.lane().is_some());
+        let network = allowed.network && self.ramp.current() && self.model.network().is_some();
+        let tripped = [self.lanes.network && !allowed.network, self.lanes.feedback && !allowed.feedback];
+        self.network_weight = approach(self.network_weight, network, tripped[0]);
+        self.feedback_weight = approach(self.feedback_weight, allowed.feedback && self.model.lane().is_some(), tripped[1]);
     }
 
     /// The reference without any correction.
@@ -274,85 +309,8 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             self.references = History::new([EndRule::Hold; R], sub_tick.wrapping_sub(1));
             self.references.push(*base);
             self.ramp.clear();
+            self.guard.restart();
         }
         self.measured.push(measured.map(finite_or_zero));
-    }
-
-    /// Share of the fast clamps that the feedback lane may use at this tick, at which its axes have these errors.
-    fn authority<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, errors: &[[f32; MAX_ERRORS]; MAX_AXES]) -> f32 {
-        let Some(layout) = &self.model.card().lane else { return 1.0 };
-        let authority = &layout.authority;
-        let desired = authority.channels.iter().map(|&channel| preview.channel(tick, usize::from(channel)) / authority.scale);
-        let strayed = errors.iter().map(|errors| errors[0] / authority.error_scale);
-        let now = desired.chain(strayed).fold(0.0, |sum, value| sum + value * value);
-        // Also what is no number counts as far astray; the bound lets the lane come back in seconds.
-        let now = if now < VIGOUR_LIMIT { now } else { VIGOUR_LIMIT };
-        let past = self.vigour * authority.decay;
-        self.vigour = if now > past { now } else { past };
-        1.0 / (1.0 + self.vigour * self.vigour)
-    }
-
-    /// The feedback lane's output on each of its axes.
-    fn feedback<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M]) -> [f32; MAX_AXES] {
-        let mut outputs = [0.0; MAX_AXES];
-        let Some(lane) = self.model.lane() else { return outputs };
-        let timing = &self.model.card().timing;
-        let dt = 1.0 / timing.reference_rate_hz;
-        let whole = timing.measurement_delay_ticks as i32;
-        let share = timing.measurement_delay_ticks - whole as f32;
-        let engaged = self.lanes.feedback && self.feedback_weight > 0.0;
-        let mut errors = [[0.0; MAX_ERRORS]; MAX_AXES];
-        for (axis, errors) in lane.axes().iter().zip(&mut errors) {
-            for (error, &(measured_channel, desired_channel)) in errors.iter_mut().zip(&axis.layout().errors) {
-                let channel = usize::from(desired_channel);
-                let newer = preview.channel(tick.wrapping_sub(whole), channel);
-                let older = preview.channel(tick.wrapping_sub(whole + 1), channel);
-                let then = newer + (older - newer) * share;
-                *error = measured.get(usize::from(measured_channel)).copied().unwrap_or(then) - then;
-            }
-        }
-        let authority = self.authority(tick, preview, &errors);
-        for (((axis, state), errors), output) in lane.axes().iter().zip(&mut self.axes).zip(errors).zip(&mut outputs) {
-            *output = state.step(lane, axis, errors, authority, dt, engaged);
-        }
-        outputs
-    }
-
-    /// Adds both lanes within limits and slew, and tells the feedback lane what was applied of it.
-    fn apply(&mut self, reference: &mut [f32; R], network: &[f32; MAX_OUTPUTS], feedback: &[f32; MAX_AXES]) {
-        let card = self.model.card();
-        let mut wanted = network.map(|value| value * self.network_weight);
-        let axes = card.lane.iter().flat_map(|lane| &lane.axes);
-        for (axis, value) in axes.clone().zip(feedback) {
-            if let Some(wanted) = wanted.get_mut(usize::from(axis.output)) {
-                *wanted += value * self.feedback_weight * self.loop_gain;
-            }
-        }
-        let mut excess = [0.0; MAX_OUTPUTS];
-        let mut saturated = false;
-        let places = self.correction.iter_mut().zip(&wanted).zip(&mut excess);
-        for (output, ((correction, &wanted), excess)) in card.outputs.iter().zip(places) {
-            let slewed = clamp(wanted, *correction - output.slew, *correction + output.slew);
-            *correction = clamp(slewed, -output.limit, output.limit);
-            *excess = *correction - wanted;
-            saturated |= *excess != 0.0;
-            if let Some(channel) = reference.get_mut(usize::from(output.channel)) {
-                *channel += *correction;
-            }
-        }
-        self.saturations = self.saturations.saturating_add(u32::from(saturated));
-        let mut applied = [0.0; MAX_AXES];
-        for ((axis, value), applied) in axes.zip(feedback).zip(&mut applied) {
-            *applied = value * self.feedback_weight + excess.get(usize::from(axis.output)).copied().unwrap_or(0.0);
-        }
-        self.settle(&applied);
-    }
-
-    fn settle(&mut self, applied: &[f32; MAX_AXES]) {
-        if let Some(lane) = self.model.lane() {
-            for (state, &value) in self.axes.iter_mut().zip(applied).take(lane.axes().len()) {
-                state.applied(lane, value);
-            }
-        }
     }
 }

@@ -16,6 +16,7 @@ mod news;
 use crate::{
     adapter::{Inference, Job, Lanes},
     flight::{Flight, PREVIEW, Settings},
+    guard::Trip,
     link::{
         Command, Order, Outcome, Reason, Received,
         message::{FrameReport, Identity, LaneReport, Motors, Telemetry, TimedSetpoint},
@@ -186,9 +187,11 @@ impl<'m> Autopilot<'m> {
             self.disarm();
             return (MotorCommand::OFF, None);
         }
-        let lanes = if self.news.lanes_off() { Lanes::NONE } else { self.lanes };
+        let age = if self.news.lanes_off() { u16::MAX } else { 0 };
         if let Some(adapter) = self.flight.adapter() {
-            adapter.switch(lanes);
+            adapter.switch(self.lanes);
+            // The guard counts it, and waits before the lanes come back.
+            adapter.set_age(age);
         }
         let (command, job) = self.flight.control(self.tick, &self.state);
         self.tick.0 = self.tick.0.wrapping_add(1);
@@ -226,8 +229,13 @@ impl<'m> Autopilot<'m> {
         let (network, feedback, late_inferences, saturations) = match self.flight.adapter() {
             Some(adapter) => {
                 let [network, feedback] = adapter.weights();
-                let lane = |weight| LaneReport { weight, ..LaneReport::default() };
-                (lane(network), lane(feedback), adapter.late(), adapter.saturations())
+                let lane = |weight, counts: [u16; Trip::ALL.len()]| {
+                    let mut report = LaneReport { weight, ..LaneReport::default() };
+                    report.trips.iter_mut().zip(counts).for_each(|(place, count)| *place = count);
+                    report
+                };
+                let trips = adapter.guard().trips();
+                (lane(network, trips.network), lane(feedback, trips.feedback), adapter.late(), adapter.saturations())
             }
             None => Default::default(),
         };

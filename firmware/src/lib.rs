@@ -27,6 +27,8 @@ pub mod network;
 
 pub mod feedback;
 
+pub mod guard;
+
 pub mod adapter;
 
 pub mod control;

@@ -10,6 +10,7 @@ use impromptu_firmware::{
     adapter::Lanes,
     control::{Airframe, AttitudeGains, PositionGains},
     flight::{Rates, Settings},
+    guard::{GuardSettings, Trips},
     model::Model,
     replay::Recorded,
     types::Setpoint,
@@ -52,9 +53,11 @@ pub struct FlightPlan<'a> {
     pub dither: Option<Dither>,
     /// Gain on the feedback lane's output, unknown to it.
     pub loop_gain: f32,
+    /// Guard of the add-on.
+    pub guard: GuardSettings,
     /// Whether every reference tick is logged.
     pub log: bool,
-    /// Whether the flight stack's inputs and answers are recorded, so that another machine can fly it again (loop gain 1, no command delay).
+    /// Whether the flight stack's inputs and answers are recorded, so that another machine can fly it again (loop gain 1, no command delay, the default guard).
     pub record: bool,
 }
 
@@ -68,6 +71,7 @@ impl<'a> FlightPlan<'a> {
             seed,
             dither: None,
             loop_gain: 1.0,
+            guard: GuardSettings::default(),
             log: false,
             record: false,
         }
@@ -87,6 +91,8 @@ pub struct FlightRecord {
     pub rms: f64,
     /// Root mean square of the correction's position part on each axis over the scored part, m.
     pub correction_rms: [f64; 3],
+    /// Trips of the guard.
+    pub trips: Trips,
     /// Every reference tick, if asked for.
     pub log: Option<FlightLog>,
     /// Everything that went into the flight stack and came out, if asked for.

@@ -74,6 +74,7 @@ fn description(inputs: usize, outputs: usize) -> Description {
             .collect(),
         envelope: vec![(-1.0, 1.0); inputs],
         lane: None,
+        monitor: None,
     }
 }
 

@@ -1,4 +1,4 @@
-//! What a network does not say of itself: signals, features, rates, limits, feedback lane, provenance.
+//! What a network does not say of itself: signals, features, rates, limits, feedback lane, monitor, provenance.
 //!
 //! Stored as JSON beside the float network, so that other tools can read and write both.
 
@@ -142,6 +142,31 @@ pub struct LaneDescription {
     pub margins: model::Margins,
 }
 
+/// One axis of the monitor: how an error of the loop follows the corrections.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MonitorAxisDescription {
+    /// (measured channel, desired channel)
+    pub error: (u8, u8),
+    /// Indices into [`Description::outputs`]: the corrections that move the measured channel.
+    pub inputs: Vec<u8>,
+    /// For each input the mean of the measured channel over each monitor tick, newest first, after a correction of 1 that lasts one
+    /// monitor tick.
+    pub taps: Vec<Vec<f32>>,
+}
+
+/// The loop's response to corrections, from which the guard tells whether the add-on does good: see [`model::MonitorLayout`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MonitorDescription {
+    /// Reference ticks in a monitor tick.
+    pub divisor: u16,
+    /// RMS over all axes of the error that validation flights showed with the add-on, in the errors' unit.
+    pub promise: f32,
+    /// Axes; their errors have one unit.
+    pub axes: Vec<MonitorAxisDescription>,
+}
+
 /// Everything about a model but the network's tensors.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -162,6 +187,9 @@ pub struct Description {
     pub envelope: Vec<(f32, f32)>,
     /// Feedback lane, if there is one.
     pub lane: Option<LaneDescription>,
+    /// The loop's response, if it is known: without it the guard cannot judge by evidence.
+    #[serde(default)]
+    pub monitor: Option<MonitorDescription>,
 }
 
 impl Description {

@@ -3,8 +3,8 @@
 use impromptu_firmware::{
     feedback,
     model::{
-        self, Arithmetic, Authority, Card, Channel, LaneAxis, LaneLayout, LayerLayout, Model, NetworkLayout, Probes, Refusal,
-        Section, SignalTable, file,
+        self, Arithmetic, Authority, Card, Channel, LaneAxis, LaneLayout, LayerLayout, Model, MonitorAxis, MonitorLayout,
+        NetworkLayout, Probes, Refusal, Section, SignalTable, file,
     },
     network::{self, Scratch, kernel::Width},
 };
@@ -176,6 +176,26 @@ fn lane(description: &Description, blob: &mut BlobWriter) -> Result<Option<LaneL
     Ok(Some(LaneLayout { lags: lags as u8, axes: bounded(&axes, "lane axes")?, authority, margins: lane.margins }))
 }
 
+fn monitor(description: &Description, blob: &mut BlobWriter) -> Result<Option<MonitorLayout>, ExportError> {
+    let Some(monitor) = &description.monitor else { return Ok(None) };
+    let taps = monitor.axes.iter().flat_map(|axis| &axis.taps).map(Vec::len).next().unwrap_or(1);
+    within(taps, "taps of the monitor", model::MAX_TAPS)?;
+    let mut axes = Vec::new();
+    for axis in &monitor.axes {
+        matching("lists of taps of a monitor axis (one for each input)", axis.inputs.len(), axis.taps.len())?;
+        for found in axis.taps.iter().map(Vec::len) {
+            matching("taps of the monitor (as many as the first input's)", taps, found)?;
+        }
+        axes.push(MonitorAxis {
+            error: axis.error,
+            inputs: bounded(&axis.inputs, "inputs of a monitor axis")?,
+            taps: blob.floats(axis.taps.iter().flatten().copied()),
+        });
+    }
+    let axes = bounded(&axes, "monitor axes")?;
+    Ok(Some(MonitorLayout { divisor: monitor.divisor, taps: taps as u8, promise: monitor.promise, axes }))
+}
+
 /// The bytes of a model file. `calibration` are rows of features in physical units: ranges of the integer network and probes come from
 /// them. A description without a network (`None`) makes a file with the feedback lane alone.
 ///
@@ -204,6 +224,7 @@ pub fn encode(
     let float = network;
     let network = network.map(|network| layout(network, precision, calibration, &description.envelope, &mut blob)).transpose()?;
     let lane = lane(description, &mut blob)?;
+    let monitor = monitor(description, &mut blob)?;
     let minima = description.envelope.iter().map(|(low, _)| *low);
     let maxima = description.envelope.iter().map(|(_, high)| *high);
     let provenance = &description.provenance;
@@ -235,6 +256,7 @@ pub fn encode(
         outputs: bounded(&description.outputs, "outputs")?,
         network,
         lane,
+        monitor,
         envelope: blob.floats(minima.chain(maxima)),
         bounds: Section::default(),
         probes: Probes::default(),

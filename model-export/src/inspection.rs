@@ -39,6 +39,8 @@ pub struct Inspection {
     pub network: Option<InspectedNetwork>,
     /// Feedback lane.
     pub lane: Option<InspectedLane>,
+    /// By what the guard judges the lanes; without it there are no trips by evidence.
+    pub monitor: Option<InspectedMonitor>,
     /// Probes of the network lane; all of them gave their bits, or the file would not have been loaded.
     pub network_probes: u8,
 }
@@ -169,6 +171,30 @@ pub struct InspectedAxis {
     pub integral_limit: f32,
 }
 
+/// By what the guard judges the lanes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct InspectedMonitor {
+    /// Time between two judgements, s.
+    pub period_s: f32,
+    /// Time that a response to a correction lasts, s.
+    pub memory_s: f32,
+    /// RMS of the error that validation flights showed with the add-on, in its unit.
+    pub promise: f32,
+    /// Unit of the errors.
+    pub unit: String,
+    /// Axes.
+    pub axes: Vec<InspectedMonitorAxis>,
+}
+
+/// One axis of the monitor.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct InspectedMonitorAxis {
+    /// Measured minus desired channel; the desired one is taken at the time of the measurement.
+    pub error: String,
+    /// Corrected reference channels that move it, each with what a lasting correction of 1 comes to.
+    pub inputs: Vec<(String, f32)>,
+}
+
 impl Inspection {
     /// What `model`, loaded from `bytes`, says.
     pub fn new(model: &Model<'_>, bytes: &[u8]) -> Self {
@@ -219,6 +245,7 @@ impl Inspection {
             outputs: outputs.collect(),
             network: network(model),
             lane: lane(model),
+            monitor: monitor(model),
             network_probes: card.probes.count,
         }
     }
@@ -276,20 +303,43 @@ fn network(model: &Model<'_>) -> Option<InspectedNetwork> {
     })
 }
 
+fn error(card: &Card<'_>, (measured, desired): (u8, u8)) -> String {
+    let (measured, desired) = (channel(&card.signals.measured, measured).0, channel(&card.signals.desired, desired).0);
+    format!("measured {measured} - desired {desired}")
+}
+
+fn monitor(model: &Model<'_>) -> Option<InspectedMonitor> {
+    let card = model.card();
+    let monitor = model.monitor()?;
+    let period_s = f32::from(monitor.divisor()) / card.timing.reference_rate_hz;
+    let axes = monitor.axes().iter().map(|(axis, response)| {
+        let inputs = axis.inputs.iter().enumerate().map(|(place, &input)| {
+            let reference = card.outputs.get(usize::from(input)).map_or(0, |output| output.channel);
+            let taps = response.split_at(place * monitor.taps()).1.split_at(monitor.taps()).0;
+            (channel(&card.signals.reference, reference).0.into(), taps.iter().sum())
+        });
+        InspectedMonitorAxis { error: error(card, axis.error), inputs: inputs.collect() }
+    });
+    let first = monitor.axes().first().map_or(0, |(axis, _)| axis.error.0);
+    Some(InspectedMonitor {
+        period_s,
+        memory_s: period_s * monitor.taps() as f32,
+        promise: monitor.promise(),
+        unit: channel(&card.signals.measured, first).1.into(),
+        axes: axes.collect(),
+    })
+}
+
 fn lane(model: &Model<'_>) -> Option<InspectedLane> {
     let card = model.card();
     let layout = card.lane.as_ref()?;
     let axes = layout.axes.iter().map(|axis| {
         let index = card.outputs.get(usize::from(axis.output)).map_or(0, |output| output.channel);
         let (output, unit) = channel(&card.signals.reference, index);
-        let error = |&(measured, desired): &(u8, u8)| {
-            let (measured, desired) = (channel(&card.signals.measured, measured).0, channel(&card.signals.desired, desired).0);
-            format!("measured {measured} - desired {desired}")
-        };
         InspectedAxis {
             output: output.into(),
             unit: unit.into(),
-            errors: axis.errors.iter().map(error).collect(),
+            errors: axis.errors.iter().map(|channels| error(card, *channels)).collect(),
             integral: axis.integral,
             fast_limit: axis.fast_limit,
             integral_limit: axis.integral_limit,

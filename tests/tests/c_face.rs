@@ -95,7 +95,7 @@ fn script(file: &[u8]) -> (Vec<u8>, Vec<u8>) {
     let rate = settings.rates.reference_hz();
     let mut adapter = Adapter::<DESIRED, MEASURED, REFERENCE>::new(&model, &quadrotor::signals(), rate, PREVIEW).unwrap();
     adapter.defer();
-    let mut preview = Preview::<DESIRED, PREVIEW>::new(quadrotor::end_rules(), 0);
+    let mut preview = Preview::<DESIRED, PREVIEW>::new(quadrotor::END_RULES, 0);
     let mut scratch = Scratch::new();
 
     let (mut script, mut answers) = (Vec::new(), Vec::new());
@@ -230,7 +230,7 @@ fn the_crazyflie_controller_corrects_setpoints_and_converts_degrees_and_pitch() 
     let mut adapter = Adapter::<DESIRED, MEASURED, REFERENCE>::new(&model, &quadrotor::signals(), 100.0, PREVIEW).unwrap();
     adapter.defer();
     adapter.switch(Lanes::BOTH);
-    let mut preview = Preview::<DESIRED, PREVIEW>::new(quadrotor::end_rules(), 0);
+    let mut preview = Preview::<DESIRED, PREVIEW>::new(quadrotor::END_RULES, 0);
     let line = |tick: i32| {
         let time = (tick as f32 / 100.0).min(2.0);
         let (starts, time) = if time > 1.0 { ([0.5, -0.25, 1.125, 0.5], time - 1.0) } else { ([0.0, 0.0, 1.0, 0.0], time) };

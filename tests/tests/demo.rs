@@ -35,6 +35,12 @@ fn folder() -> PathBuf {
 static RESULTS: LazyLock<Results> =
     LazyLock::new(|| run(&DemoSettings { out: Some(folder()), ..DemoSettings::default() }, &Silent).expect("the demo runs"));
 
+/// Folder of the models of the demo.
+pub(crate) fn models() -> PathBuf {
+    LazyLock::force(&RESULTS);
+    folder().join("models")
+}
+
 fn row(vehicle: &str, condition: &str, speed: f64, method: Method) -> &'static Row {
     let found = RESULTS
         .table

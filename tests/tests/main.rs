@@ -5,6 +5,7 @@
 //! - [`c_face`]: C programs get the bits of Rust, and the header is what the source says;
 //! - [`decoder`]: mutated model files are refused or flown, never a panic;
 //! - [`elf`]: what a control tick can reach in the flashed binary: no panic, no heap; its stack, with golden memory;
+//! - [`guard`]: lanes that do harm are handed over before the error is 1.5 times the baseline's, with numbers;
 //! - [`emulator`]: the emulator is found, fails loudly, and counts repeatably;
 //! - [`mcu`]: what kernels cost on the microcontroller, beside other engines, with a golden table;
 //! - [`kernels`]: the network kernels in assembly give the bits of their portable twin;
@@ -20,6 +21,7 @@ mod decoder;
 mod demo;
 mod elf;
 mod emulator;
+mod guard;
 mod kernels;
 mod link;
 mod mcu;

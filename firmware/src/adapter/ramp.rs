@@ -15,7 +15,8 @@ pub(super) struct Ramp {
     /// Reference tick whose inference is awaited, and the newest that came.
     awaited: Option<i32>,
     delivered: Option<Inference>,
-    missing: bool,
+    /// Inferences in a row that did not come in time.
+    missing: u16,
     late: u32,
 }
 
@@ -27,7 +28,7 @@ impl Ramp {
         primed: false,
         awaited: None,
         delivered: None,
-        missing: false,
+        missing: 0,
         late: 0,
     };
 
@@ -54,7 +55,7 @@ impl Ramp {
     pub(super) fn publish(&mut self) {
         let Some(awaited) = self.awaited.take() else { return };
         let inference = self.delivered.take().filter(|inference| inference.tick == awaited);
-        self.missing = inference.is_none();
+        self.missing = if inference.is_none() { self.missing.saturating_add(1) } else { 0 };
         self.start = self.end;
         match inference {
             Some(Inference { outputs, .. }) => {
@@ -75,7 +76,12 @@ impl Ramp {
 
     /// Whether there is a correction, and the newest inference was in time.
     pub(super) fn current(&self) -> bool {
-        self.primed && !self.missing
+        self.primed && self.missing == 0
+    }
+
+    /// Those up to now, since the last one in time.
+    pub(super) fn late_in_a_row(&self) -> u16 {
+        self.missing
     }
 
     /// Inferences that did not come in time.

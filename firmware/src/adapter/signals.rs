@@ -37,6 +37,23 @@ impl<const D: usize, const M: usize, const R: usize, const N: usize> Signals for
     }
 }
 
+/// A measured channel against a desired one at the time of the measurement, which is `delay` reference ticks old.
+#[inline]
+pub(super) fn matched_error<const D: usize, const N: usize>(
+    tick: i32,
+    delay: f32,
+    preview: &Preview<D, N>,
+    measured: &[f32],
+    (measured_channel, desired_channel): (u8, u8),
+) -> f32 {
+    let whole = delay as i32;
+    let channel = usize::from(desired_channel);
+    let newer = preview.channel(tick.wrapping_sub(whole), channel);
+    let older = preview.channel(tick.wrapping_sub(whole.saturating_add(1)), channel);
+    let then = newer + (older - newer) * (delay - whole as f32);
+    measured.get(usize::from(measured_channel)).copied().unwrap_or(then) - then
+}
+
 /// Desired channel of the same name for each reference channel.
 pub(super) fn base_channels<const R: usize>(table: &SignalTable<'_>) -> [usize; R] {
     core::array::from_fn(|r| {

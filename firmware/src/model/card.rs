@@ -28,6 +28,10 @@ pub const MAX_AXES: usize = 4;
 pub const MAX_LAGS: usize = 32;
 /// Most errors that one axis of a feedback lane reads.
 pub const MAX_ERRORS: usize = 2;
+/// Most monitor ticks that a response of the monitor lasts.
+pub const MAX_TAPS: usize = 32;
+/// Most corrections whose response one axis of the monitor adds up.
+pub const MAX_INPUTS: usize = 2;
 
 /// A piece of the blob: byte offset from the blob's start and length in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -224,6 +228,31 @@ pub struct LaneLayout {
     pub margins: Margins,
 }
 
+/// One axis of the monitor: how an error of the loop follows the corrections.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MonitorAxis {
+    /// (measured channel, desired channel)
+    pub error: (u8, u8),
+    /// Indices into [`Card::outputs`]: the corrections that move the measured channel.
+    pub inputs: Vec<u8, MAX_INPUTS>,
+    /// f32: of each input the mean of the measured channel over each monitor tick, newest first, after a correction of 1 that lasts one
+    /// monitor tick; in the measured channel's unit.
+    pub taps: Section,
+}
+
+/// What the guard needs to tell whether the add-on does good: the error without it is the error less the loop's response to the correction.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MonitorLayout {
+    /// Reference ticks in a monitor tick.
+    pub divisor: u16,
+    /// Monitor ticks that a response lasts.
+    pub taps: u8,
+    /// RMS over all axes of the error that validation flights showed with the add-on, in the errors' unit.
+    pub promise: f32,
+    /// Axes; their errors have one unit.
+    pub axes: Vec<MonitorAxis, MAX_AXES>,
+}
+
 /// Inputs with the exact outputs expected, re-run by every machine that loads the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Probes {
@@ -256,6 +285,8 @@ pub struct Card<'a> {
     pub network: Option<NetworkLayout>,
     /// Feedback lane.
     pub lane: Option<LaneLayout>,
+    /// The loop's response, by which the guard judges the lanes.
+    pub monitor: Option<MonitorLayout>,
     /// f32: smallest, then largest value of each feature in training.
     pub envelope: Section,
     /// f32: low, high, difference, lipschitz ([`super::OutputBounds`]) of each output; empty without a network.

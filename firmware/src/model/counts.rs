@@ -12,8 +12,8 @@ use serde::{
 };
 
 use super::{
-    Arithmetic, Authority, Channel, LayerLayout, MAX_AXES, MAX_CHANNELS, MAX_ERRORS, MAX_FEATURES, MAX_LAYERS, MAX_OUTPUTS,
-    Margins, Output, Provenance, Refusal, Section, Timing,
+    Arithmetic, Authority, Channel, LayerLayout, MAX_AXES, MAX_CHANNELS, MAX_ERRORS, MAX_FEATURES, MAX_INPUTS, MAX_LAYERS,
+    MAX_OUTPUTS, Margins, Output, Provenance, Refusal, Section, Timing,
 };
 use crate::features::Feature;
 
@@ -36,6 +36,12 @@ impl Inner for Feature {}
 impl Inner for Output {}
 impl Inner for LayerLayout {}
 impl Inner for (u8, u8) {}
+impl Inner for u8 {}
+impl Inner for MonitoredAxis {
+    fn inner(&self) -> usize {
+        self.inputs.items
+    }
+}
 impl Inner for Axis {
     fn inner(&self) -> usize {
         self.errors.items
@@ -102,6 +108,21 @@ struct Lane {
 }
 
 #[derive(Deserialize)]
+struct MonitoredAxis {
+    _error: (u8, u8),
+    inputs: Count<u8>,
+    _taps: Section,
+}
+
+#[derive(Deserialize)]
+struct Monitor {
+    _divisor: u16,
+    _taps: u8,
+    _promise: f32,
+    axes: Count<MonitoredAxis>,
+}
+
+#[derive(Deserialize)]
 struct Counts<'a> {
     _name: &'a str,
     #[serde(borrow)]
@@ -113,6 +134,7 @@ struct Counts<'a> {
     outputs: Count<Output>,
     network: Option<Network>,
     lane: Option<Lane>,
+    monitor: Option<Monitor>,
 }
 
 /// Why a card that does not decode is refused.
@@ -120,6 +142,7 @@ pub(super) fn refusal(card: &[u8]) -> Refusal {
     let Ok((counts, _)) = postcard::take_from_bytes::<Counts<'_>>(card) else { return Refusal::Card };
     let layers = counts.network.map_or(0, |network| network.layers.items);
     let (axes, errors) = counts.lane.map_or((0, 0), |lane| (lane.axes.items, lane.axes.largest));
+    let (monitored, inputs) = counts.monitor.map_or((0, 0), |monitor| (monitor.axes.items, monitor.axes.largest));
     let lists = [
         ("number of desired channels", counts.signals.desired.items, MAX_CHANNELS),
         ("number of measured channels", counts.signals.measured.items, MAX_CHANNELS),
@@ -129,6 +152,8 @@ pub(super) fn refusal(card: &[u8]) -> Refusal {
         ("number of layers", layers, MAX_LAYERS),
         ("number of lane axes", axes, MAX_AXES),
         ("number of lane errors", errors, MAX_ERRORS),
+        ("number of monitor axes", monitored, MAX_AXES),
+        ("number of monitor inputs", inputs, MAX_INPUTS),
     ];
     lists.into_iter().find(|(_, found, limit)| found > limit).map_or(Refusal::Card, |(what, found, limit)| Refusal::Shape {
         what,

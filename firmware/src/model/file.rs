@@ -27,12 +27,13 @@
 //! | skip | blocks of 8 outputs × 8 (1 + f padded to 2) | a float stream ([`crate::network::kernel`]) |
 //! | rows of each layer | as its kernel asks for | a float or integer stream |
 //! | coefficients of each lane axis | lags (errors + 1) | f32, newest lag first: each error's, then the output's own |
+//! | taps of each monitor axis | inputs × taps | f32, newest first: of each input in turn |
 //! | envelope | 2 f | f32 smallest value of each feature in training, then largest of each |
 //! | bounds | 4 o, none without a network | f32 low, high, difference, lipschitz of each output ([`super::OutputBounds`]) |
 //! | network probes | probes × (f + o) | f32 features of each probe, then outputs of each |
 //! | lane probe | axes | f32 outputs ([`crate::feedback::probe`]) |
 //!
-//! Version 1 is frozen: `tests/golden/models` holds the exact bytes of small models, which every build of this version reads and writes.
+//! Version 2 is frozen: `tests/golden/models` holds the exact bytes of small models, which every build of this version reads and writes.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 
@@ -41,7 +42,7 @@ use super::refusal::Refusal;
 /// First bytes of every model file.
 pub const MAGIC: [u8; 8] = *b"IMPROMPT";
 /// Format version that this build reads and writes.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;
 /// Length of the header in bytes.
 pub const HEADER: usize = 32;
 /// Alignment of the blob and of each of its sections, bytes.

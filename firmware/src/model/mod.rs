@@ -18,7 +18,7 @@ pub use card::*;
 pub use place::Place;
 pub use refusal::Refusal;
 
-use crate::{feedback::Lane, network::Network};
+use crate::{feedback::Lane, guard::Monitor, network::Network};
 
 /// A model that passed every check.
 #[derive(Debug)]
@@ -27,6 +27,7 @@ pub struct Model<'a> {
     blob: Blob<'a>,
     network: Option<Network<'a>>,
     lane: Option<Lane<'a>>,
+    monitor: Option<Monitor<'a>>,
     envelope: (Floats<'a>, Floats<'a>),
     bounds: Bounds<'a>,
     checksum: u32,
@@ -53,13 +54,14 @@ impl<'a> Model<'a> {
             Some(layout) => Some(Lane::new(layout, &blob)?),
             None => None,
         };
+        let monitor = card.monitor.as_ref().map(|layout| Monitor::new(layout, &blob)).transpose()?;
         let envelope = blob.floats(card.envelope, 2 * card.features.len(), "envelope")?.split_at(card.features.len());
         if envelope.0.iter().zip(envelope.1.iter()).any(|(low, high)| low > high) {
             return Err(Refusal::Value { what: "envelope" });
         }
         let bounds = Bounds::new(&card, &blob)?;
         validate::probes(&card, &blob, network.as_ref().map(|network| (network, &envelope, &bounds)), lane.as_ref())?;
-        Ok(Self { card, blob, network, lane, envelope, bounds, checksum: file::checksum(bytes) })
+        Ok(Self { card, blob, network, lane, monitor, envelope, bounds, checksum: file::checksum(bytes) })
     }
 
     /// What the model says of itself.
@@ -80,6 +82,11 @@ impl<'a> Model<'a> {
     /// The feedback lane's map.
     pub fn lane(&self) -> Option<&Lane<'a>> {
         self.lane.as_ref()
+    }
+
+    /// The loop's response to corrections; without it the guard cannot judge by evidence.
+    pub fn monitor(&self) -> Option<&Monitor<'a>> {
+        self.monitor.as_ref()
     }
 
     /// Smallest and largest value of each feature in training.

@@ -1,6 +1,6 @@
 //! Checks of a decoded card: every index exists, every number makes sense, every probe gives its bits.
 
-use super::{Blob, Bounds, Card, Floats, LaneLayout, MAX_LAGS, MAX_WIDTH, Refusal};
+use super::{Blob, Bounds, Card, Floats, LaneLayout, MAX_LAGS, MAX_TAPS, MAX_WIDTH, MonitorLayout, Refusal};
 use crate::{
     features::{Relative, Source},
     feedback::{self, Lane},
@@ -30,7 +30,8 @@ pub(super) fn card(card: &Card<'_>) -> Result<(), Refusal> {
             }
         }
     }
-    card.lane.as_ref().map_or(Ok(()), |lane| self::lane(card, lane))
+    card.lane.as_ref().map_or(Ok(()), |lane| self::lane(card, lane))?;
+    card.monitor.as_ref().map_or(Ok(()), |monitor| self::monitor(card, monitor))
 }
 
 fn timing(card: &Card<'_>) -> Result<(), Refusal> {
@@ -147,6 +148,36 @@ fn lane(card: &Card<'_>, lane: &LaneLayout) -> Result<(), Refusal> {
         let limits = [axis.fast_limit, axis.integral_limit];
         if !axis.integral.is_finite() || limits.iter().any(|limit| !(limit.is_finite() && *limit >= 0.0)) {
             return Err(Refusal::Value { what: "lane integral or limit" });
+        }
+    }
+    Ok(())
+}
+
+fn monitor(card: &Card<'_>, monitor: &MonitorLayout) -> Result<(), Refusal> {
+    if monitor.taps == 0 || usize::from(monitor.taps) > MAX_TAPS {
+        return Err(Refusal::Shape { what: "monitor taps", found: monitor.taps.into(), limit: MAX_TAPS as u32 });
+    }
+    if monitor.divisor == 0 {
+        return Err(Refusal::Value { what: "monitor divisor" });
+    }
+    if !(monitor.promise.is_finite() && monitor.promise >= 0.0) {
+        return Err(Refusal::Value { what: "monitor promise" });
+    }
+    for axis in &monitor.axes {
+        let (measured, desired) = axis.error;
+        if usize::from(measured) >= card.signals.measured.len() {
+            return Err(Refusal::Index { what: "monitor measured channel", found: measured });
+        }
+        if usize::from(desired) >= card.signals.desired.len() {
+            return Err(Refusal::Index { what: "monitor desired channel", found: desired });
+        }
+        for (index, &found) in axis.inputs.iter().enumerate() {
+            if usize::from(found) >= card.outputs.len() {
+                return Err(Refusal::Index { what: "monitor input", found });
+            }
+            if axis.inputs.iter().take(index).any(|other| *other == found) {
+                return Err(Refusal::Duplicate { what: "monitor input", found });
+            }
         }
     }
     Ok(())

@@ -1,10 +1,13 @@
 //! `host-sim fly`: one trajectory, with and without the add-on.
 
-use std::path::PathBuf;
+use std::{collections::BTreeMap, path::PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 use clap::{Args, ValueEnum};
-use impromptu_firmware::adapter::Lanes;
+use impromptu_firmware::{
+    adapter::Lanes,
+    guard::{Trip, Trips},
+};
 use serde::Serialize;
 
 use super::{
@@ -91,7 +94,32 @@ struct Flown {
     model: Option<String>,
     extra_delay_ms: f64,
     flights: Vec<PerFlight>,
+    /// Trips of the guard in the add-on's flight, if there were any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    trips: Option<Tripped>,
     log: Option<PathBuf>,
+}
+
+/// How often the guard took a lane off.
+#[derive(Debug, Serialize)]
+struct Tripped {
+    by_reason: BTreeMap<&'static str, u16>,
+    network: u16,
+    feedback: u16,
+}
+
+impl Tripped {
+    fn of(trips: &Trips) -> Option<Self> {
+        let reasons = Trip::ALL.into_iter().map(|trip| (trip.name(), trips.of(trip))).filter(|(_, count)| *count > 0);
+        let by_reason: BTreeMap<_, _> = reasons.collect();
+        let [network, feedback] = trips.by_lane();
+        (!by_reason.is_empty()).then_some(Self { by_reason, network, feedback })
+    }
+
+    fn text(&self) -> String {
+        let reasons: Vec<_> = self.by_reason.iter().map(|(name, count)| format!("{name} {count}")).collect();
+        format!("guard: network off {} times, feedback off {} times ({})\n", self.network, self.feedback, reasons.join(", "))
+    }
 }
 
 impl Fly {
@@ -153,6 +181,7 @@ impl Fly {
             model: file.as_ref().map(ModelFile::name),
             extra_delay_ms: self.extra_delay_ms,
             flights: flights.collect(),
+            trips: records.last().and_then(|record| Tripped::of(&record.trips)),
             log: self.log,
         };
         session.format.print(&flown, || text(&flown))
@@ -182,4 +211,5 @@ fn text(flown: &Flown) -> String {
         format!("{} at {}x speed: {} {} {}\n", flight.trajectory, flight.speed, flight.vehicle, flight.gains, flight.condition)
     });
     head + &table(["method", "RMS error, cm", "reduction, %"], 1, rows)
+        + &flown.trips.as_ref().map_or_else(String::new, Tripped::text)
 }

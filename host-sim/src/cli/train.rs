@@ -24,7 +24,7 @@ use super::{
 use crate::{
     experiment::{
         Candidates, Judge, Learned, Loop, Purpose, Recipe, Rows, best_in_flight, demo::Observer as _, derived, describe, learn,
-        smoothing, validation_strokes, write_model_files,
+        monitor, promise, smoothing, validation_strokes, write_model_files,
     },
     flight_log::FlightLog,
     training::Progress,
@@ -141,8 +141,16 @@ impl Train {
             Err(reason) => (format!("no feedback lane: {reason}"), None, Some(reason.clone())),
         };
         session.console.note(&remarks);
-        let description = describe(lane.as_ref().ok().map(|choice| &choice.lane), &remarks);
-        let model = encode(&description, Some(&learned.quantised), Precision::Int8, &learned.rows.calibration)?;
+        let mut description = describe(lane.as_ref().ok().map(|choice| &choice.lane), &remarks);
+        let exported =
+            |description: &Description| encode(description, Some(&learned.quantised), Precision::Int8, &learned.rows.calibration);
+        let mut model = exported(&description)?;
+        // What the guard judges by needs flights that the add-on flew; without a vehicle there are none.
+        if let (Some(plant), Ok(mut monitor)) = (&origin.plant, monitor(&recipe, identification)) {
+            monitor.promise = promise(plant, &validation, &model, derived(seed, Purpose::Validation))?;
+            description.monitor = Some(monitor);
+            model = exported(&description)?;
+        }
         let files = write_model_files(&folder, &self.name, &learned, &description, &model)?;
         let trained = Trained {
             name: self.name,

@@ -1,13 +1,18 @@
 //! From a loop to its models: collect, learn, design the lane, export.
 
 use impromptu_firmware::{adapter::Lanes, model::Model};
-use impromptu_model_export::{ExportError, FloatNetwork, Precision, description::LaneDescription, encode};
+use impromptu_model_export::{
+    Description, ExportError, FloatNetwork, Precision,
+    description::{LaneDescription, MonitorDescription},
+    encode,
+};
 
 use super::{
     flights::{FlightsError, Loop, reduction},
     lane::{LaneChoice, LaneRefusal, choose_lane, dithered_logs, strongest_lane},
     learn::{Candidates, LearnError, Learned, Rows, learn},
-    models::{ModelSet, describe, feedforward},
+    models::{FromFlights, ModelSet, describe, feedforward},
+    monitor::{monitor, promise},
     recipe::{LaneRecipe, Recipe},
 };
 use crate::{
@@ -131,17 +136,29 @@ pub fn build(recipe: &Recipe, plant: &Loop, seed: u64, progress: &mut dyn FnMut(
         Ok(choice) => format!("feedback lane: {}", choice.design),
         Err(reason) => format!("no feedback lane: {reason}"),
     };
-    let models = ModelSet::new(
-        &recipe,
-        plant,
-        &learned,
-        lane.as_ref().ok().map(|choice| &choice.lane),
-        feedforward_lane.as_ref().map(|choice| &choice.lane),
-        &remarks,
-        seed,
-    )?;
+    let monitor = monitor(&recipe, &dithered).ok();
+    let from_flights = |lane: Option<&LaneDescription>, validation: &[Trajectory], encode: &Encode<'_>| {
+        let promised = |monitor: &MonitorDescription| {
+            let model = encode(describe(lane))?;
+            Ok::<_, BuildError>(MonitorDescription {
+                promise: promise(plant, validation, &model, flight_seed)?,
+                ..monitor.clone()
+            })
+        };
+        Ok::<_, BuildError>(FromFlights { lane: lane.cloned(), monitor: monitor.as_ref().map(promised).transpose()? })
+    };
+    let own = from_flights(lane.as_ref().ok().map(|choice| &choice.lane), &validation, &|description| {
+        encode(&description, Some(&learned.quantised), Precision::Int8, &learned.rows.calibration)
+    })?;
+    let of_feedforward = from_flights(feedforward_lane.as_ref().map(|choice| &choice.lane), &nominal, &|description| {
+        feedforward(&plant.settings, description)
+    })?;
+    let models = ModelSet::new(&recipe, plant, &learned, &own, &of_feedforward, &remarks, seed)?;
     Ok(Built { learned, lane, feedforward_lane, models })
 }
+
+/// Makes a model file of a description.
+type Encode<'a> = dyn Fn(Description) -> Result<Vec<u8>, ExportError> + 'a;
 
 /// Further delay of the whole loop in one of the flights by which networks are chosen, s.
 const LATE_S: f64 = 0.02;
@@ -162,6 +179,7 @@ pub fn best_in_flight(
     rows: &Rows,
 ) -> Result<usize, BuildError> {
     let lanes = Lanes { network: true, feedback: false };
+    let plant = &plant.unguarded();
     let late = plant.delayed(LATE_S);
     let kinds: Vec<(&Loop, &[Trajectory])> = [plant, &late]
         .into_iter()

@@ -1,6 +1,6 @@
 //! The flights of an experiment: one vehicle with its gains under one condition.
 
-use impromptu_firmware::{adapter::Lanes, flight::Settings, model::Model};
+use impromptu_firmware::{adapter::Lanes, flight::Settings, guard::GuardSettings, model::Model};
 
 use crate::{
     condition::Condition,
@@ -32,6 +32,8 @@ pub struct Loop {
     pub settings: Settings,
     /// Condition.
     pub condition: Condition,
+    /// Guard of the add-on.
+    pub guard: GuardSettings,
 }
 
 impl Loop {
@@ -40,13 +42,25 @@ impl Loop {
     /// # Errors
     /// If the vehicle has no such gains.
     pub fn new(vehicle: Vehicle, gains: &str, condition: Condition) -> Result<Self, RolloutError> {
-        Ok(Self { settings: rollout::settings(&vehicle, gains)?, vehicle, gains: gains.into(), condition })
+        Ok(Self {
+            settings: rollout::settings(&vehicle, gains)?,
+            vehicle,
+            gains: gains.into(),
+            condition,
+            guard: GuardSettings::default(),
+        })
     }
 
     /// The same loop with `seconds` more delay in the whole of it ([`Condition::delayed`]).
     #[must_use]
     pub fn delayed(&self, seconds: f64) -> Self {
         Self { condition: self.condition.delayed(seconds), ..self.clone() }
+    }
+
+    /// The same loop without a guard: for flights that judge what an add-on does by itself.
+    #[must_use]
+    pub fn unguarded(&self) -> Self {
+        Self { guard: GuardSettings::OFF, ..self.clone() }
     }
 
     /// Rate of the references, Hz.
@@ -91,7 +105,7 @@ impl Loop {
         let plans: Vec<FlightPlan<'_>> = trajectories
             .iter()
             .zip(seed..)
-            .map(|(trajectory, seed)| FlightPlan { model, loop_gain, ..FlightPlan::new(trajectory, seed) })
+            .map(|(trajectory, seed)| FlightPlan { model, loop_gain, guard: self.guard, ..FlightPlan::new(trajectory, seed) })
             .collect();
         Ok(self.fly(&plans)?.into_iter().map(|record| record.rms).collect())
     }

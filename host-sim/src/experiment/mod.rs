@@ -12,6 +12,7 @@ mod flights;
 mod lane;
 mod learn;
 mod models;
+mod monitor;
 mod recipe;
 
 pub use breakdown::Breakdown;
@@ -21,5 +22,6 @@ pub use files::write_model_files;
 pub use flights::{FlightsError, Loop, reduction};
 pub use lane::{LaneChoice, LaneRefusal, choose_lane, dithered_logs, strongest_lane};
 pub use learn::{Candidates, Judge, LearnError, Learned, Rows, learn};
-pub use models::{ModelSet, describe, feedforward};
+pub use models::{FromFlights, ModelSet, describe, feedforward};
+pub use monitor::{monitor, promise};
 pub use recipe::{Excitation, LaneRecipe, Recipe, Signal};

@@ -8,7 +8,7 @@ use impromptu_firmware::{
 };
 use impromptu_model_export::{
     Description, ExportError, FloatNetwork, Precision,
-    description::{LaneDescription, Provenance, Signals, Timing},
+    description::{LaneDescription, MonitorDescription, Provenance, Signals, Timing},
     encode,
 };
 
@@ -33,13 +33,22 @@ pub struct ModelSet {
     pub description: Description,
 }
 
+/// What a model has from dithered logs and validation flights.
+#[derive(Clone, Debug, Default)]
+pub struct FromFlights {
+    /// Feedback lane.
+    pub lane: Option<LaneDescription>,
+    /// What the guard judges the lanes by.
+    pub monitor: Option<MonitorDescription>,
+}
+
 /// Limits above the largest correction in training.
 const LIMIT_FACTOR: f32 = 1.5;
 /// A correction may cross its whole range in this many reference ticks.
 const SLEW_TICKS: f32 = 5.0;
 
 impl ModelSet {
-    /// Encodes all models of a loop, each with the feedback lane if there is one; the feed-forward has a lane of its own.
+    /// Encodes all models of a loop, each with the feedback lane and the monitor if there are any; the feed-forward has its own.
     ///
     /// # Errors
     /// If a model cannot be encoded.
@@ -47,22 +56,25 @@ impl ModelSet {
         recipe: &Recipe,
         plant: &Loop,
         learned: &Learned,
-        lane: Option<&LaneDescription>,
-        feedforward_lane: Option<&LaneDescription>,
+        own: &FromFlights,
+        of_feedforward: &FromFlights,
         remarks: &str,
         seed: u64,
     ) -> Result<Self, ExportError> {
-        let describe = |name: &str, lane| describe(recipe, plant, &learned.rows, lane, name, remarks, seed);
-        let feedforward = feedforward(&plant.settings, describe("feedforward", feedforward_lane))?;
+        let describe = |name: &str, from: &FromFlights| {
+            let description = describe(recipe, plant, &learned.rows, from.lane.as_ref(), name, remarks, seed);
+            Description { monitor: from.monitor.clone(), ..description }
+        };
+        let feedforward = feedforward(&plant.settings, describe("feedforward", of_feedforward))?;
         let make = |name: &str, network: &FloatNetwork, precision| {
-            encode(&describe(name, lane), Some(network), precision, &learned.rows.calibration)
+            encode(&describe(name, own), Some(network), precision, &learned.rows.calibration)
         };
         Ok(Self {
             feedforward,
             ridge: make("ridge", &learned.ridge, Precision::Float)?,
             float: make("net_f32", &learned.network, Precision::Float)?,
             int8: make("net_int8", &learned.quantised, Precision::Int8)?,
-            description: describe("net_int8", lane),
+            description: describe("net_int8", own),
         })
     }
 }
@@ -79,7 +91,7 @@ fn outputs(rows: &Rows, lane: Option<&LaneDescription>) -> Vec<Output> {
         .collect()
 }
 
-/// Description of a model of a loop.
+/// Description of a model of a loop, without a monitor.
 pub fn describe(
     recipe: &Recipe,
     plant: &Loop,
@@ -112,6 +124,7 @@ pub fn describe(
         outputs: outputs(rows, lane),
         envelope: rows.envelope.clone(),
         lane: lane.cloned(),
+        monitor: None,
     }
 }
 

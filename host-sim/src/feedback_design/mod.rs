@@ -20,6 +20,7 @@ pub mod lane;
 pub mod margins;
 mod normal_equations;
 mod refusal;
+pub mod response;
 pub mod riccati;
 #[cfg(test)]
 mod synthetic;

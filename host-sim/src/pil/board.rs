@@ -5,9 +5,10 @@ use std::time::{Duration, Instant};
 use impromptu_firmware::{
     adapter::Lanes,
     flight::Settings,
+    guard::Trips,
     link::{
         Command, FRAME, Outcome, Receiver, Report, Reports, Sender,
-        message::{Inertial, Position, Telemetry, TimedSetpoint},
+        message::{Inertial, LaneReport, Position, Telemetry, TimedSetpoint},
     },
     types::{MotorCommand, Reference, Setpoint, State, Tick},
 };
@@ -256,6 +257,13 @@ impl<L: Line> FlightStack for BoardFlight<'_, L> {
 
     fn reference(&self) -> &Reference {
         &self.reference
+    }
+
+    /// Of all flights since the start.
+    fn trips(&mut self) -> Trips {
+        let lane = |lane: &LaneReport| lane.trips.first_chunk().copied().unwrap_or_default();
+        let telemetry = &self.board.telemetry;
+        Trips { network: lane(&telemetry.network), feedback: lane(&telemetry.feedback) }
     }
 }
 

@@ -136,12 +136,13 @@ impl<'a, S: FlightStack> Pilot<'a, S> {
         }
     }
 
-    pub(super) fn finish(self) -> FlightRecord {
+    pub(super) fn finish(mut self) -> FlightRecord {
         let scored = self.plan.trajectory.scored.len().max(1) as f64;
         let rms = (self.squares / scored).sqrt();
         FlightRecord {
             // A flight that left the numbers is as bad as can be, not "not a number".
             rms: if rms.is_finite() { rms } else { f64::INFINITY },
+            trips: self.stack.trips(),
             correction_rms: self.correction_squares.map(|sum| (sum / scored).sqrt()),
             recorded: self.recorder.map(Recorder::finish),
             log: self.plan.log.then(|| FlightLog {

@@ -5,6 +5,7 @@
 
 use impromptu_firmware::{
     flight::{Flight, Settings},
+    guard::Trips,
     network::Scratch,
     types::{MotorCommand, Reference, Setpoint, State, Tick},
 };
@@ -25,6 +26,8 @@ pub trait FlightStack {
     fn step(&mut self, tick: Tick, state: &State) -> MotorCommand;
     /// The reference that the loop tracks now.
     fn reference(&self) -> &Reference;
+    /// Trips of the guard so far.
+    fn trips(&mut self) -> Trips;
 }
 
 impl<S: FlightStack> FlightStack for &mut S {
@@ -47,6 +50,10 @@ impl<S: FlightStack> FlightStack for &mut S {
     fn reference(&self) -> &Reference {
         S::reference(self)
     }
+
+    fn trips(&mut self) -> Trips {
+        S::trips(self)
+    }
 }
 
 /// The flight stack in this program.
@@ -67,6 +74,7 @@ impl<'a> Software<'a> {
             flight.attach(model, settings, lanes)?;
             if let Some(adapter) = flight.adapter() {
                 adapter.set_loop_gain(plan.loop_gain);
+                adapter.set_guard(plan.guard);
             }
         }
         flight.set_command_delay(condition.command_delay_ticks(settings.rates.control_hz.into()));
@@ -93,5 +101,9 @@ impl FlightStack for Software<'_> {
 
     fn reference(&self) -> &Reference {
         self.flight.reference()
+    }
+
+    fn trips(&mut self) -> Trips {
+        self.flight.adapter().map(|adapter| adapter.guard().trips()).unwrap_or_default()
     }
 }

@@ -5,7 +5,7 @@ use std::fmt;
 use comfy_table::{Table, presets};
 use impromptu_firmware::{model::Interpolation, network::Activation, preview::EndRule};
 
-use super::{InspectedFeature, InspectedLane, InspectedNetwork, Inspection, Timing};
+use super::{InspectedFeature, InspectedLane, InspectedMonitor, InspectedNetwork, Inspection, Timing};
 use crate::description::ChannelDescription;
 
 /// Width of the labels.
@@ -51,6 +51,10 @@ impl fmt::Display for Inspection {
             Some(lane) => line(f, "feedback lane", lane)?,
             None => line(f, "feedback lane", "none")?,
         }
+        match &self.monitor {
+            Some(monitor) => line(f, "monitor", monitor)?,
+            None => line(f, "monitor", "none: the guard cannot judge the lanes by evidence")?,
+        }
         line(
             f,
             "probes",
@@ -66,6 +70,9 @@ impl fmt::Display for Inspection {
         }
         if let Some(lane) = &self.lane {
             writeln!(f, "Feedback lane\n{}", axes_table(lane))?;
+        }
+        if let Some(monitor) = &self.monitor {
+            writeln!(f, "Monitor: a lasting correction of 1 comes to\n{}", monitor_table(monitor))?;
         }
         if !self.features.is_empty() {
             writeln!(f, "Features: offsets in network ticks, range in training\n{}", features_table(&self.features))?;
@@ -119,6 +126,13 @@ impl fmt::Display for InspectedNetwork {
             (false, _) => "",
         };
         write!(f, "{skip}, {}, {} bytes, {} multiply-adds", self.arithmetic, self.bytes, self.multiply_adds)
+    }
+}
+
+impl fmt::Display for InspectedMonitor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { axes, period_s, memory_s, promise, unit } = self;
+        write!(f, "{} axes, every {period_s} s, response of {memory_s} s, promised error {promise} {unit}", axes.len())
     }
 }
 
@@ -188,6 +202,14 @@ fn axes_table(lane: &InspectedLane) -> String {
         ]
     });
     table(["reference", "unit", "errors", "clamp", "integral", "its clamp"], rows)
+}
+
+fn monitor_table(monitor: &InspectedMonitor) -> String {
+    let rows = monitor
+        .axes
+        .iter()
+        .flat_map(|axis| axis.inputs.iter().map(|(input, gain)| [axis.error.clone(), input.clone(), format!("{gain:.3}")]));
+    table(["error", "correction of", "response"], rows)
 }
 
 /// One row for each run of features that differ in their offset only.

@@ -63,9 +63,9 @@ fn wrong_header_is_named() {
         Model::from_bytes(&sealed(bytes)).unwrap_err()
     };
     assert_eq!(refusal(&|bytes| bytes[0] = b'i'), Refusal::NotAModel);
-    let version = refusal(&|bytes| bytes[8] = 2);
-    assert_eq!(version, Refusal::Version { found: 2 });
-    assert!(version.to_string().contains("format version 2, this build reads 1"));
+    let version = refusal(&|bytes| bytes[8] = 1);
+    assert_eq!(version, Refusal::Version { found: 1 });
+    assert!(version.to_string().contains("format version 1, this build reads 2"));
     assert_eq!(refusal(&|bytes| bytes[30] = 1), Refusal::Value { what: "reserved part of the header" });
     let trailing = refusal(&|bytes| bytes.push(0));
     assert_eq!(trailing, Refusal::Length { expected: good.len() as u64, found: good.len() + 1 });

@@ -3,6 +3,7 @@
 use impromptu_firmware::{
     adapter::{Adapter, Lanes},
     feedback::AxisState,
+    guard::GuardSettings,
     model::{Model, Output},
     network::Scratch,
     preview::{EndRule, Preview},
@@ -38,6 +39,7 @@ fn corrections(
     let (description, bytes) = lane_only(lane, delay_s);
     let model = Model::from_bytes(&bytes).unwrap();
     let mut adapter: Adapter<'_, 2, 2, 2> = Adapter::new(&model, &table(&description), 100.0, CAPACITY).unwrap();
+    adapter.set_guard(GuardSettings::OFF);
     adapter.switch(Lanes { network: false, feedback: true });
     let mut preview = Preview::<2, CAPACITY>::new([EndRule::Hold, EndRule::Zero], -16);
     (-16..0).for_each(|tick| preview.push(desired(tick)));

@@ -7,7 +7,10 @@ use impromptu_firmware::{
 };
 use impromptu_model_export::{
     Description, FloatNetwork, Precision,
-    description::{ChannelDescription, LaneAxisDescription, LaneDescription, Provenance, Signals, Timing},
+    description::{
+        ChannelDescription, LaneAxisDescription, LaneDescription, MonitorAxisDescription, MonitorDescription, Provenance,
+        Signals, Timing,
+    },
     encode,
     float_network::{Activation, DenseLayer},
 };
@@ -58,6 +61,7 @@ pub(crate) fn description(window: usize) -> Description {
         outputs: vec![Output { channel: 0, limit: 0.5, slew: 0.1 }, Output { channel: 1, limit: 2.0, slew: 0.5 }],
         envelope: vec![(-3.0, 3.0); window],
         lane: None,
+        monitor: None,
     }
 }
 
@@ -124,13 +128,15 @@ pub(crate) fn rows(numbers: &mut Numbers, network: &FloatNetwork, count: usize) 
     (0..count).map(|_| row(numbers)).collect()
 }
 
-/// A small model with everything: two int8 layers, skip, lane, probes.
+/// A small model with everything: two int8 layers, skip, lane, monitor, probes.
 pub(crate) fn small_model(precision: Precision) -> Vec<u8> {
     let mut numbers = Numbers(1);
     let network = network(&mut numbers, 3, &[(5, Activation::Tanh)], 2, true);
     let rows = rows(&mut numbers, &network, 32);
     let mut description = description(3);
     description.lane = Some(lane([vec![-0.5, 0.1], vec![-0.2, 0.0]], vec![0.3, 0.1], -0.2));
+    let axis = MonitorAxisDescription { error: (0, 0), inputs: vec![0, 1], taps: vec![vec![0.1, 0.5, 0.3], vec![0.0, 0.2, 0.1]] };
+    description.monitor = Some(MonitorDescription { divisor: 5, promise: 0.01, axes: vec![axis] });
     encode(&description, Some(&network), precision, &rows).unwrap()
 }
 

@@ -35,7 +35,7 @@ fn the_format_is_what_it_was() {
         assert!(golden == bytes, "{name}: {}", difference(&golden, &bytes));
         // What an older build wrote is read for as long as the version is the same.
         assert!(Model::from_bytes(&golden).is_ok());
-        assert_eq!(&golden[..12], b"IMPROMPT\x01\0\0\0");
+        assert_eq!(&golden[..12], b"IMPROMPT\x02\0\0\0");
     }
-    assert_eq!((file::VERSION, file::HEADER, file::ALIGNMENT), (1, 32, 16));
+    assert_eq!((file::VERSION, file::HEADER, file::ALIGNMENT), (2, 32, 16));
 }

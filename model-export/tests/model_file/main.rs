@@ -8,6 +8,7 @@ mod command_line;
 mod damage;
 mod description;
 mod golden;
+mod guard;
 mod precision;
 mod refusals;
 mod round_trip;

@@ -7,7 +7,7 @@ use impromptu_firmware::{
 };
 use impromptu_model_export::{
     Description, FloatNetwork, Precision,
-    description::{LaneAxisDescription, LaneDescription, Provenance, Timing},
+    description::{LaneAxisDescription, LaneDescription, MonitorAxisDescription, MonitorDescription, Provenance, Timing},
     encode,
     float_network::{Activation, DenseLayer},
 };
@@ -62,8 +62,19 @@ pub(crate) fn file(shape: &Shape, precision: Precision) -> Vec<u8> {
             authority: Default::default(),
             margins: Margins::default(),
         }),
+        monitor: Some(MonitorDescription {
+            divisor: 5,
+            promise: 0.01,
+            axes: (0..3).map(|axis| monitored(axis, &mut random)).collect(),
+        }),
     };
     encode(&description, Some(&network), precision, &calibration).unwrap()
+}
+
+/// An axis of the monitor with responses as long as there can be.
+fn monitored(axis: u8, random: &mut Xoshiro256PlusPlus) -> MonitorAxisDescription {
+    let taps = vec![uniform(random, 32, 0.1), uniform(random, 32, 0.1)];
+    MonitorAxisDescription { error: (axis, axis), inputs: vec![axis, axis + 3], taps }
 }
 
 fn network(shape: &Shape, inputs: usize, random: &mut Xoshiro256PlusPlus) -> FloatNetwork {

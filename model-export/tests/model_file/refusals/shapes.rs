@@ -55,10 +55,47 @@ fn shapes_and_sections() {
                 "no outputs",
                 |c, _b| {
                     c.lane = None;
+                    c.monitor = None;
                     c.outputs.clear()
                 },
                 Refusal::Shape { .. },
                 "number of outputs is 0"
+            ),
+            case!(
+                "taps",
+                |c, _b| c.monitor.as_mut().unwrap().taps = 33,
+                Refusal::Shape { found: 33, limit: 32, .. },
+                "monitor taps is 33"
+            ),
+            case!(
+                "fewer taps",
+                |c, _b| c.monitor.as_mut().unwrap().taps = 2,
+                Refusal::SectionLength { what: "monitor taps", expected: 16, found: 24 },
+                "section monitor taps has 24 bytes"
+            ),
+            case!(
+                "monitor input",
+                |c, _b| c.monitor.as_mut().unwrap().axes[0].inputs[1] = 2,
+                Refusal::Index { what: "monitor input", found: 2 },
+                "monitor input names index 2"
+            ),
+            case!(
+                "monitor input twice",
+                |c, _b| c.monitor.as_mut().unwrap().axes[0].inputs[1] = 0,
+                Refusal::Duplicate { what: "monitor input", found: 0 },
+                "monitor input names index 0 twice"
+            ),
+            case!(
+                "monitor channel",
+                |c, _b| c.monitor.as_mut().unwrap().axes[0].error = (2, 0),
+                Refusal::Index { what: "monitor measured channel", found: 2 },
+                "monitor measured channel names index 2"
+            ),
+            case!(
+                "promise",
+                |c, _b| c.monitor.as_mut().unwrap().promise = f32::NAN,
+                Refusal::Value { what: "monitor promise" },
+                "monitor promise is out of"
             ),
             case!("lags", |c, _b| c.lane.as_mut().unwrap().lags = MAX_LAGS as u8 + 1, Refusal::Shape { .. }, "lane lags is 33"),
             case!("no lags", |c, _b| c.lane.as_mut().unwrap().lags = 0, Refusal::Shape { .. }, "lane lags is 0"),

@@ -1,0 +1,123 @@
+//! The feedback lane's state, and the loop's errors.
+//!
+//! *in* measured channels, desired ones at the time of the measurement; *out* errors, and what the lane wants on each of its axes; *never* more
+//! than its clamps, which [`crate::feedback`] keeps; *source* ours.
+
+use super::signals::matched_error;
+use crate::{
+    feedback::AxisState,
+    model::{MAX_AXES, MAX_ERRORS, Model},
+    preview::Preview,
+};
+
+/// Bound of what lowers the feedback lane's authority: a millionth of it is left.
+const VIGOUR_LIMIT: f32 = 1e6;
+
+/// Errors of each axis of the feedback lane.
+pub(super) type Errors = [[f32; MAX_ERRORS]; MAX_AXES];
+
+/// The feedback lane's state.
+#[derive(Debug)]
+pub(super) struct Feedback {
+    axes: [AxisState; MAX_AXES],
+    /// Recent peak of what is desired of the loop and of its errors ([`crate::model::Authority`]).
+    vigour: f32,
+}
+
+impl Feedback {
+    /// At rest.
+    pub(super) const REST: Self = Self { axes: [AxisState::REST; MAX_AXES], vigour: 0.0 };
+
+    /// Share of the fast clamps that the feedback lane may use at this tick, at which its axes have these errors.
+    fn authority<const D: usize, const N: usize>(
+        &mut self,
+        model: &Model<'_>,
+        tick: i32,
+        preview: &Preview<D, N>,
+        errors: &Errors,
+    ) -> f32 {
+        let Some(layout) = &model.card().lane else { return 1.0 };
+        let authority = &layout.authority;
+        let desired = authority.channels.iter().map(|&channel| preview.channel(tick, usize::from(channel)) / authority.scale);
+        let strayed = errors.iter().map(|errors| errors[0] / authority.error_scale);
+        let now = desired.chain(strayed).fold(0.0, |sum, value| sum + value * value);
+        // Also what is no number counts as far astray; the bound lets the lane come back in seconds.
+        let now = if now < VIGOUR_LIMIT { now } else { VIGOUR_LIMIT };
+        let past = self.vigour * authority.decay;
+        self.vigour = if now > past { now } else { past };
+        1.0 / (1.0 + self.vigour * self.vigour)
+    }
+
+    /// The feedback lane's output on each of its axes.
+    pub(super) fn step<const D: usize, const N: usize>(
+        &mut self,
+        model: &Model<'_>,
+        tick: i32,
+        preview: &Preview<D, N>,
+        errors: &Errors,
+        engaged: bool,
+    ) -> [f32; MAX_AXES] {
+        let mut outputs = [0.0; MAX_AXES];
+        let Some(lane) = model.lane() else { return outputs };
+        let dt = 1.0 / model.card().timing.reference_rate_hz;
+        let authority = self.authority(model, tick, preview, errors);
+        for (((axis, state), errors), output) in lane.axes().iter().zip(&mut self.axes).zip(errors).zip(&mut outputs) {
+            *output = state.step(lane, axis, *errors, authority, dt, engaged);
+        }
+        outputs
+    }
+
+    /// Tells the lane what was applied of it.
+    pub(super) fn applied(&mut self, model: &Model<'_>, applied: &[f32; MAX_AXES]) {
+        if let Some(lane) = model.lane() {
+            for (state, &value) in self.axes.iter_mut().zip(applied).take(lane.axes().len()) {
+                state.applied(lane, value);
+            }
+        }
+    }
+
+    /// The lane is faded out.
+    pub(super) fn release(&mut self) {
+        self.axes.iter_mut().for_each(AxisState::release);
+    }
+}
+
+/// Errors of each axis of the feedback lane.
+pub(super) fn errors<const D: usize, const N: usize>(
+    model: &Model<'_>,
+    tick: i32,
+    preview: &Preview<D, N>,
+    measured: &[f32],
+) -> Errors {
+    let mut errors = [[0.0; MAX_ERRORS]; MAX_AXES];
+    let Some(lane) = model.lane() else { return errors };
+    let delay = model.card().timing.measurement_delay_ticks;
+    for (axis, errors) in lane.axes().iter().zip(&mut errors) {
+        for (error, channels) in errors.iter_mut().zip(&axis.layout().errors) {
+            *error = matched_error(tick, delay, preview, measured, *channels);
+        }
+    }
+    errors
+}
+
+/// Errors of each axis of the monitor, most of which the feedback lane has already.
+pub(super) fn monitored<const D: usize, const N: usize>(
+    model: &Model<'_>,
+    tick: i32,
+    preview: &Preview<D, N>,
+    measured: &[f32],
+    known: &Errors,
+) -> [f32; MAX_AXES] {
+    let mut errors = [0.0; MAX_AXES];
+    let Some(monitor) = model.monitor() else { return errors };
+    let delay = model.card().timing.measurement_delay_ticks;
+    let lane = model.lane().map_or(&[][..], |lane| lane.axes());
+    for (index, ((axis, _), error)) in monitor.axes().iter().zip(&mut errors).enumerate() {
+        let same = lane.get(index).is_some_and(|lane| lane.layout().errors.first() == Some(&axis.error));
+        *error = match known.get(index) {
+            Some([first, ..]) if same => *first,
+            _ => matched_error(tick, delay, preview, measured, axis.error),
+        };
+    }
+    errors
+}

@@ -1,0 +1,204 @@
+//! The evidence: what the error would be without a lane.
+//!
+//! *in* the loop's errors and what each lane contributed to the correction, at every reference tick; *out* whether a lane does harm; *never* a
+//! number that is not finite; *source* ours. Round calm flight the loop is linear: the error without a lane is e - G u, with the lane's contribution
+//! u and the response G of the measured channel to the correction, which the model stores ([`Monitor`]).
+//!
+//! The feedback lane answers for the error with it against that without it. What the network lane asks for does not depend on what is
+//! measured, or hardly, while the feedback lane would also answer to the network's mistakes: so the network is judged on what it would do
+//! alone and in full, against no add-on at all, also while it is faded out: it comes back when it would do good.
+
+use super::{GuardSettings, Monitor, watch::leak};
+use crate::{
+    math::{clamp, finite_or_zero},
+    model::{Floats, MAX_AXES, MAX_INPUTS, MAX_OUTPUTS, MAX_TAPS},
+};
+
+/// Bound of the errors that are believed.
+const LARGEST: f32 = 1e9;
+
+/// What the lanes contributed to the correction of each output in a reference tick. The first two add up to the correction.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Shares {
+    /// The network lane's part.
+    pub(crate) network: [f32; MAX_OUTPUTS],
+    /// The feedback lane's part.
+    pub(crate) feedback: [f32; MAX_OUTPUTS],
+    /// What the network lane would contribute alone and in full, within the limits.
+    pub(crate) alone: [f32; MAX_OUTPUTS],
+}
+
+/// One contribution over the last monitor ticks.
+#[derive(Clone, Copy, Debug)]
+struct Past {
+    ring: [f32; MAX_TAPS],
+    sum: f32,
+    /// Monitor ticks since it was other than zero.
+    quiet: u8,
+}
+
+impl Past {
+    const REST: Self = Self { ring: [0.0; MAX_TAPS], sum: 0.0, quiet: u8::MAX };
+
+    /// Ends a monitor tick and returns the response to this contribution; `head` is the newest tick's place in the ring.
+    fn respond(&mut self, response: Floats<'_>, head: usize, mean: f32) -> f32 {
+        let newest = finite_or_zero(self.sum * mean);
+        self.sum = 0.0;
+        self.quiet = if newest == 0.0 { self.quiet.saturating_add(1) } else { 0 };
+        if let Some(place) = self.ring.get_mut(head) {
+            *place = newest;
+        }
+        let taps = response.len();
+        if usize::from(self.quiet) >= taps {
+            return 0.0;
+        }
+        let ring = self.ring.get(..taps).unwrap_or_default();
+        let Some((newer, older)) = ring.split_at_checked(head) else { return 0.0 };
+        // From the newest on, which is the first of the upper part.
+        let (near, far) = response.split_at(older.len());
+        dot(far, newer, dot(near, older, 0.0))
+    }
+}
+
+fn dot(coefficients: Floats<'_>, values: &[f32], start: f32) -> f32 {
+    coefficients.iter().zip(values).fold(start, |sum, (coefficient, value)| sum + coefficient * value)
+}
+
+/// Recent energies of the loop's errors.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Energies {
+    /// As they are.
+    pub with: f32,
+    /// Without the feedback lane.
+    pub without_feedback: f32,
+    /// With the network lane alone, in full.
+    pub network_alone: f32,
+    /// Without any correction.
+    pub baseline: f32,
+    /// The same over a longer time.
+    pub usual: f32,
+}
+
+/// Errors with and without the lanes.
+#[derive(Clone, Debug)]
+pub struct Evidence {
+    /// Reference ticks in the running monitor tick.
+    phase: u16,
+    /// Place of the next newest in the rings.
+    head: usize,
+    errors: [f32; MAX_AXES],
+    /// Of each axis and input: the network's part, the feedback's, and what the network alone would add to its part.
+    pasts: [[[Past; 3]; MAX_INPUTS]; MAX_AXES],
+    energies: Energies,
+    harmful: [bool; 2],
+    idle: bool,
+}
+
+impl Evidence {
+    pub(super) const fn new() -> Self {
+        Self {
+            phase: 0,
+            head: 0,
+            errors: [0.0; MAX_AXES],
+            pasts: [[[Past::REST; 3]; MAX_INPUTS]; MAX_AXES],
+            energies: Energies { with: 0.0, without_feedback: 0.0, network_alone: 0.0, baseline: 0.0, usual: 0.0 },
+            harmful: [false; 2],
+            idle: true,
+        }
+    }
+
+    /// Recent energies, the squares of the errors' unit, added over the axes.
+    pub fn energies(&self) -> Energies {
+        self.energies
+    }
+
+    /// Whether the network and the feedback lane do harm.
+    pub(super) fn harmful(&self) -> [bool; 2] {
+        self.harmful
+    }
+
+    /// Forgets everything: no lane has acted for long, or ticks are missing.
+    pub(crate) fn restart(&mut self) {
+        if !self.idle {
+            *self = Self::new();
+        }
+    }
+
+    /// Adds a reference tick with the errors of the monitor's axes.
+    pub(super) fn observe(
+        &mut self,
+        monitor: &Monitor<'_>,
+        errors: &[f32],
+        shares: &Shares,
+        settings: &GuardSettings,
+        rate_hz: f32,
+    ) {
+        self.idle = false;
+        for (sum, error) in self.errors.iter_mut().zip(errors) {
+            *sum += clamp(finite_or_zero(*error), -LARGEST, LARGEST);
+        }
+        let share = |shares: &[f32; MAX_OUTPUTS], output: u8| shares.get(usize::from(output)).copied().unwrap_or(0.0);
+        for ((axis, _), pasts) in monitor.axes().iter().zip(&mut self.pasts) {
+            for (&output, [network, feedback, more]) in axis.inputs.iter().zip(pasts) {
+                let acted = share(&shares.network, output);
+                network.sum += acted;
+                feedback.sum += share(&shares.feedback, output);
+                more.sum += share(&shares.alone, output) - acted;
+            }
+        }
+        self.phase = self.phase.saturating_add(1);
+        if self.phase >= monitor.divisor() {
+            self.phase = 0;
+            self.close(monitor, settings, rate_hz);
+        }
+    }
+
+    /// Ends a monitor tick.
+    fn close(&mut self, monitor: &Monitor<'_>, settings: &GuardSettings, rate_hz: f32) {
+        let ticks = f32::from(monitor.divisor());
+        let mean = 1.0 / ticks;
+        self.head = if self.head == 0 { monitor.taps().saturating_sub(1) } else { self.head - 1 };
+        let mut now = Energies::default();
+        let mut acts = false;
+        for (((axis, response), pasts), error) in monitor.axes().iter().zip(&mut self.pasts).zip(&mut self.errors) {
+            let with = *error * mean;
+            *error = 0.0;
+            let [mut network, mut feedback, mut more] = [0.0; 3];
+            let mut rest = *response;
+            for (_, pasts) in axis.inputs.iter().zip(pasts) {
+                let (taps, others) = rest.split_at(monitor.taps());
+                rest = others;
+                let responses = pasts.each_mut().map(|past| past.respond(taps, self.head, mean));
+                acts |= pasts[0].quiet == 0;
+                network += responses[0];
+                feedback += responses[1];
+                more += responses[2];
+            }
+            let alone = with - feedback;
+            now.with += with * with;
+            now.without_feedback += alone * alone;
+            now.network_alone += (alone + more) * (alone + more);
+            now.baseline += (alone - network) * (alone - network);
+        }
+        let weight = |seconds: f32| leak(ticks / (seconds * rate_hz));
+        let recent = weight(settings.evidence_s);
+        let past = &mut self.energies;
+        for (energy, now, weight) in [
+            (&mut past.with, now.with, recent),
+            (&mut past.without_feedback, now.without_feedback, recent),
+            (&mut past.network_alone, now.network_alone, recent),
+            (&mut past.baseline, now.baseline, recent),
+            (&mut past.usual, now.baseline, weight(settings.usual_s)),
+        ] {
+            *energy = finite_or_zero(*energy + (now - *energy) * weight);
+        }
+        let floor = settings.evidence_floor * monitor.promise();
+        let factor = settings.evidence_factor * settings.evidence_factor;
+        let worse = |with: f32, without: f32| with > factor * without + floor * floor;
+        let baseline = if past.usual > past.baseline { past.usual } else { past.baseline };
+        let share = settings.evidence_share * settings.evidence_share * baseline;
+        // While the network acts, what is measured must be worse too.
+        let network = worse(past.network_alone, baseline) && (!acts || worse(past.with, baseline));
+        self.harmful = [network, worse(past.with, past.without_feedback + share)];
+    }
+}

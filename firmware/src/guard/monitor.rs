@@ -1,0 +1,50 @@
+//! The loop's response to corrections, checked: what [`crate::model::MonitorLayout`] points to.
+
+use heapless::Vec;
+
+use crate::model::{Blob, Floats, MAX_AXES, MonitorAxis, MonitorLayout, Refusal};
+
+/// A checked monitor.
+#[derive(Debug)]
+pub struct Monitor<'a> {
+    divisor: u16,
+    taps: usize,
+    promise: f32,
+    axes: Vec<(MonitorAxis, Floats<'a>), MAX_AXES>,
+}
+
+impl<'a> Monitor<'a> {
+    /// Checks the sections of a layout against the blob.
+    ///
+    /// # Errors
+    /// With the section that is wrong.
+    pub fn new(layout: &MonitorLayout, blob: &Blob<'a>) -> Result<Self, Refusal> {
+        let taps = usize::from(layout.taps);
+        let mut axes = Vec::new();
+        for axis in &layout.axes {
+            let response = blob.floats(axis.taps, axis.inputs.len() * taps, "monitor taps")?;
+            let _ = axes.push((axis.clone(), response));
+        }
+        Ok(Self { divisor: layout.divisor.max(1), taps, promise: layout.promise, axes })
+    }
+
+    /// Reference ticks in a monitor tick.
+    pub fn divisor(&self) -> u16 {
+        self.divisor
+    }
+
+    /// Monitor ticks that a response lasts.
+    pub fn taps(&self) -> usize {
+        self.taps
+    }
+
+    /// RMS of the error that validation flights showed with the add-on.
+    pub fn promise(&self) -> f32 {
+        self.promise
+    }
+
+    /// The axes with their responses, input by input.
+    pub fn axes(&self) -> &[(MonitorAxis, Floats<'a>)] {
+        &self.axes
+    }
+}

@@ -1,0 +1,72 @@
+//! Settings of the guard, with defaults that were measured.
+
+use serde::{Deserialize, Serialize};
+
+/// When lanes trip and come back. Those of the evidence trip lanes in validation strokes only where
+/// motors saturate (1.7 times the speed).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GuardSettings {
+    /// Whether the guard acts at all. Off for flights that judge what a lane does by itself.
+    pub enabled: bool,
+    /// Time for which a cause must be absent before its lane comes back, s.
+    pub hold_s: f32,
+    /// Time in which a lane that trips is faded out, s, if the model's own fade takes longer.
+    pub handover_s: f32,
+    /// Features may be this share of the training box' width outside of it,
+    pub envelope_margin: f32,
+    /// and this much besides, in the feature's unit: a box can be flat.
+    pub envelope_floor: f32,
+    /// Sub-rate ticks in a row outside that trip.
+    pub envelope_ticks: u16,
+    /// Age of the measurement beyond the model's delay that trips, s.
+    pub stale_s: f32,
+    /// Share of recent ticks in which a lane asks for more than limit and slew let pass that trips,
+    pub saturated_share: f32,
+    /// and the time constant of what is recent, s.
+    pub saturated_s: f32,
+    /// Late inferences in a row that trip.
+    pub late_in_a_row: u16,
+    /// The error with a lane may be this factor of what it would be without,
+    pub evidence_factor: f32,
+    /// and besides this many times what the model promises,
+    pub evidence_floor: f32,
+    /// and with the feedback lane this share of what it would be without any correction.
+    pub evidence_share: f32,
+    /// Time constant of the errors' energies, s,
+    pub evidence_s: f32,
+    /// and of the usual error without any correction, below which none counts as small, s.
+    pub usual_s: f32,
+    /// Trips by evidence after which a lane stays off until it is armed again.
+    pub evidence_trips: u16,
+}
+
+impl GuardSettings {
+    /// No guard.
+    pub const OFF: Self = Self { enabled: false, ..Self::DEFAULT };
+
+    const DEFAULT: Self = Self {
+        enabled: true,
+        hold_s: 2.0,
+        handover_s: 0.15,
+        envelope_margin: 0.5,
+        envelope_floor: 0.02,
+        envelope_ticks: 5,
+        stale_s: 0.1,
+        saturated_share: 0.5,
+        saturated_s: 1.0,
+        late_in_a_row: 5,
+        evidence_factor: 1.2,
+        evidence_floor: 2.5,
+        evidence_share: 0.15,
+        evidence_s: 0.15,
+        usual_s: 4.0,
+        evidence_trips: 3,
+    };
+}
+
+impl Default for GuardSettings {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}

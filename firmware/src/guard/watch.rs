@@ -1,0 +1,53 @@
+//! One lane's latch: trips at a cause, stays off while it lasts and for the hold time after it.
+
+use super::Trip;
+use crate::math::clamp;
+
+/// State of one lane.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Watch {
+    tripped: bool,
+    /// Reference ticks that must pass without a cause.
+    rest: u32,
+    /// Trips by evidence since it was armed.
+    evidence: u16,
+    locked: bool,
+}
+
+impl Watch {
+    /// Free to act.
+    pub(super) const ARMED: Self = Self { tripped: false, rest: 0, evidence: 0, locked: false };
+
+    pub(super) fn tripped(&self) -> bool {
+        self.tripped
+    }
+
+    /// Forgets what the evidence said; a running hold time goes on.
+    pub(super) fn unlock(&mut self) {
+        (self.evidence, self.locked) = (0, false);
+    }
+
+    /// One reference tick with the cause that is present, if any; returns it if it trips the lane now.
+    pub(super) fn tick(&mut self, cause: Option<Trip>, hold: u32, evidence_trips: u16) -> Option<Trip> {
+        let Some(trip) = cause else {
+            self.rest = self.rest.saturating_sub(1);
+            self.tripped &= self.rest > 0 || self.locked;
+            return None;
+        };
+        self.rest = hold.max(1);
+        if self.tripped {
+            return None;
+        }
+        self.tripped = true;
+        if trip == Trip::Evidence {
+            self.evidence = self.evidence.saturating_add(1);
+            self.locked = self.evidence >= evidence_trips;
+        }
+        Some(trip)
+    }
+}
+
+/// A share of a first-order filter in a tick, within 0..=1; what is no number counts as 1.
+pub(super) fn leak(share: f32) -> f32 {
+    if share >= 0.0 { clamp(share, 0.0, 1.0) } else { 1.0 }
+}
