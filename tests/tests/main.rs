@@ -10,6 +10,8 @@
 //! - [`mcu`]: what kernels cost on the microcontroller, beside other engines, with a golden table;
 //! - [`kernels`]: the network kernels in assembly give the bits of their portable twin;
 //! - [`link`]: any bytes on the link are refused or messages, never a panic;
+//! - [`processor`]: control is never late, whatever the network takes; the processor's share; late inferences;
+//! - [`pil`]: the flashed binary flies the plant, bit for bit, through good lines and bad ones;
 //! - [`unsafe_code`]: there is none but those kernels, each block with its reason.
 //!
 //! The parts have tests of their own: plant against an independent simulator and every generator and parser in `host-sim`, model
@@ -26,4 +28,5 @@ mod kernels;
 mod link;
 mod mcu;
 mod pil;
+mod processor;
 mod unsafe_code;

@@ -14,7 +14,7 @@ use impromptu_model_export::Precision;
 use crate::board::model;
 
 /// The loop of the emulated flights.
-fn plant() -> Loop {
+pub(crate) fn plant() -> Loop {
     Loop::new(Vehicle::named("crazyflie").unwrap(), "stock", Condition::named("lab").unwrap()).unwrap()
 }
 

@@ -32,8 +32,13 @@ pub(crate) const TANH: Shape = Shape { name: "36-64x2-6 \"tanh\"", hidden: &[64,
 /// The paper's four layers of 128 with ReLU.
 pub(crate) const RELU: Shape = Shape { name: "36-128x4-6 relu", hidden: &[128, 128, 128, 128], activation: Activation::Relu };
 
-/// The bytes of a model file with both lanes.
+/// The bytes of a model file with both lanes, its network at 10 Hz.
 pub(crate) fn file(shape: &Shape, precision: Precision) -> Vec<u8> {
+    file_at(10, shape, precision)
+}
+
+/// The same with a network that is evaluated every `divisor` reference ticks, of 10 ms.
+pub(crate) fn file_at(divisor: u16, shape: &Shape, precision: Precision) -> Vec<u8> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(7);
     let features: Vec<Feature> = window(&[0, 1, 2], -4..=8).collect();
     assert_eq!(features.len(), 36);
@@ -49,7 +54,7 @@ pub(crate) fn file(shape: &Shape, precision: Precision) -> Vec<u8> {
         signals: (&quadrotor::signals()).into(),
         timing: Timing {
             reference_rate_hz: 100.0,
-            divisor: 10,
+            divisor,
             interpolation: Interpolation::Linear,
             measurement_delay_s: 0.013,
             fade_s: 0.5,
