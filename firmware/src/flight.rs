@@ -157,6 +157,14 @@ impl<'m> Flight<'m> {
         Ok(())
     }
 
+    /// Whether [`Flight::attach`] takes a model.
+    ///
+    /// # Errors
+    /// As [`Flight::attach`].
+    pub fn accepts(model: &Model<'_>, rates: &Rates) -> Result<(), Refusal> {
+        QuadrotorAdapter::new(model, &quadrotor::signals(), rates.reference_hz(), PREVIEW).map(|_| ())
+    }
+
     /// The add-on, if there is one.
     pub fn adapter(&mut self) -> Option<&mut QuadrotorAdapter<'m>> {
         self.adapter.as_mut()
