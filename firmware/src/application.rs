@@ -10,7 +10,10 @@ use heapless::Vec;
 use crate::{
     adapter::{Inference, Job},
     autopilot::{Autopilot, Meters, Reaction},
-    link::{Command, Commands, FRAME, Fault, Message, Order, Outcome, Reason, Received, Receiver, Report, Sender, message::FrameReport},
+    link::{
+        Command, Commands, FRAME, Fault, Message, Order, Outcome, Reason, Received, Receiver, Report, Sender,
+        message::FrameReport,
+    },
     types::MotorCommand,
 };
 

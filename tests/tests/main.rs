@@ -7,7 +7,8 @@
 //! - [`mcu`]: what kernels cost on the microcontroller, beside other engines, with a golden table;
 //! - [`kernels`]: the network kernels in assembly give the bits of their portable twin;
 //! - [`link`]: any bytes on the link are refused or messages, never a panic;
-//! - [`unsafe_code`]: there is none but those kernels, each block with its reason.
+//! - [`unsafe_code`]: there is none but those kernels, each block with its reason;
+//! - [`upload`]: a model goes over the link into the flash, and flies from the next start on.
 //!
 //! The parts have tests of their own: plant against an independent simulator and every generator and parser in `host-sim`, model
 //! files bit by bit damaged in `model-export`, kernels and values in `firmware`.
@@ -21,3 +22,4 @@ mod link;
 mod mcu;
 mod pil;
 mod unsafe_code;
+mod upload;

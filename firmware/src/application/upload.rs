@@ -172,7 +172,10 @@ mod tests {
         };
         let refused = Outcome::Refused;
         assert_eq!(obey(&mut uploader, Command::ModelCommit), refused(Reason::NoModel));
-        assert_eq!(obey(&mut uploader, Command::ModelBegin { length: 5000, checksum: 0 }), refused(Reason::Length { limit: 4064 }));
+        assert_eq!(
+            obey(&mut uploader, Command::ModelBegin { length: 5000, checksum: 0 }),
+            refused(Reason::Length { limit: 4064 })
+        );
         assert_eq!(obey(&mut uploader, begin), Outcome::Done);
         assert_eq!(obey(&mut uploader, chunk(CHUNK)), refused(Reason::Offset { expected: 0 }));
         assert_eq!(obey(&mut uploader, chunk(0)), Outcome::Done);

@@ -6,10 +6,12 @@
 mod board;
 mod emulator;
 mod faults;
+mod flash;
 mod line;
+mod upload;
 
 pub use board::{Board, Figures};
-pub use emulator::{Emulated, LinkKind, connect, start};
+pub use emulator::{Emulated, LinkKind, connect, restart, start};
 pub use faults::{Faults, Faulty};
 pub use line::{Line, Lockstep, Serial};
 
