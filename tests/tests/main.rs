@@ -5,6 +5,7 @@
 //! - [`decoder`]: mutated model files are refused or flown, never a panic;
 //! - [`emulator`]: the emulator is found, fails loudly, and counts repeatably;
 //! - [`mcu`]: what kernels cost on the microcontroller, beside other engines, with a golden table;
+//! - [`image`]: what is flashed is within its budget, leaves the models alone, and starts behind a boot loader;
 //! - [`kernels`]: the network kernels in assembly give the bits of their portable twin;
 //! - [`link`]: any bytes on the link are refused or messages, never a panic;
 //! - [`unsafe_code`]: there is none but those kernels, each block with its reason;
@@ -17,6 +18,7 @@ mod board;
 mod decoder;
 mod demo;
 mod emulator;
+mod image;
 mod kernels;
 mod link;
 mod mcu;

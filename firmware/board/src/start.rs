@@ -7,7 +7,7 @@ use impromptu_firmware::{
     network::Network,
     storage::{Place, Sequence, Survey, survey},
 };
-use static_cell::StaticCell;
+use static_cell::ConstStaticCell;
 
 use crate::CRAZYFLIE;
 
@@ -26,9 +26,8 @@ pub struct Start {
 /// Looks at the slots and sets the application up; once, since it lies in a static. `None`: the airframe cannot be mixed.
 #[inline(never)]
 pub fn start(slots: [&'static [u8]; 2]) -> Option<Start> {
-    static APPLICATION: StaticCell<Application<'static>> = StaticCell::new();
-    // Its fields are not all zero: as a constant it would lie in flash too.
-    let application = APPLICATION.init_with(Application::new);
+    static APPLICATION: ConstStaticCell<Application<'static>> = ConstStaticCell::new(Application::new());
+    let application = APPLICATION.take();
     let autopilot = application.autopilot();
     autopilot.configure(&CRAZYFLIE).ok()?;
     let Survey { flies, spare, sequence } = survey(slots, fits);
@@ -50,6 +49,6 @@ pub fn fits(model: &Model<'_>) -> Result<(), Refusal> {
 
 #[inline(never)]
 fn model(file: &'static [u8]) -> Option<&'static Model<'static>> {
-    static MODEL: StaticCell<Model<'static>> = StaticCell::new();
-    Some(MODEL.init(Model::from_bytes(file).ok()?))
+    static MODEL: ConstStaticCell<Model<'static>> = ConstStaticCell::new(Model::VACANT);
+    Model::load_into(MODEL.take(), file).ok()
 }

@@ -151,6 +151,8 @@ impl<L: Line> Board<L> {
         for _ in 0..ATTEMPTS {
             self.refusals.clear();
             self.stored = None;
+            // Ends whatever the line has invented.
+            self.outgoing.push(0);
             self.tell(PIECE, piece);
             self.talk(|board| board.stored.is_some());
             for _ in 0..LOCKSTEP_WAIT {
