@@ -62,6 +62,15 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     /// # Errors
     /// If signals, rate or preview length do not fit.
     pub fn new(model: &'m Model<'m>, table: &SignalTable<'_>, rate_hz: f32, capacity: usize) -> Result<Self, Refusal> {
+        Self::check(model, table, rate_hz, capacity)?;
+        Ok(Self::tied(model, Self::base(table)))
+    }
+
+    /// Whether [`Adapter::new`] takes a model.
+    ///
+    /// # Errors
+    /// As [`Adapter::new`].
+    pub fn check(model: &Model<'_>, table: &SignalTable<'_>, rate_hz: f32, capacity: usize) -> Result<(), Refusal> {
         let card = model.card();
         same_signals(card, table, [D, M, R])?;
         let rate = card.timing.reference_rate_hz;
@@ -73,9 +82,20 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         if past + future + 1 > capacity as u32 {
             return Err(Refusal::Preview { needed: past + future + 1, available: capacity as u32 });
         }
-        Ok(Self {
+        Ok(())
+    }
+
+    /// Desired channel that each reference channel starts from.
+    pub(crate) fn base(table: &SignalTable<'_>) -> [usize; R] {
+        base_channels(table)
+    }
+
+    /// Of a model that was checked. Inlined, so that its 4 KB are made where they stay.
+    #[inline(always)]
+    pub(crate) fn tied(model: &'m Model<'m>, base: [usize; R]) -> Self {
+        Self {
             model,
-            base: base_channels(table),
+            base,
             measured: History::new([EndRule::Hold; M], 0),
             // No sub-rate tick is that low: the first one that is seen starts the histories.
             references: History::new([EndRule::Hold; R], i32::MIN),
@@ -83,12 +103,12 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             deferred: false,
             feedback: Feedback::REST,
             lanes: Lanes::NONE,
-            guard: Guard::new(GuardSettings::default(), rate),
+            guard: Guard::new(GuardSettings::default(), model.card().timing.reference_rate_hz),
             network_weight: 0.0,
             feedback_weight: 0.0,
             correction: Correction::NONE,
             loop_gain: 1.0,
-        })
+        }
     }
 
     /// Forgets everything but the lanes that are wanted and the counts: the next tick is the first one.

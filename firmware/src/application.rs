@@ -10,11 +10,14 @@ use heapless::Vec;
 use crate::{
     adapter::{Inference, Job},
     autopilot::{Autopilot, Meters, Reaction},
-    link::{Commands, FRAME, Fault, Message, Order, Outcome, Reason, Received, Receiver, Report, Sender, message::FrameReport},
+    link::{
+        Command, Commands, FRAME, Fault, Message, Order, Outcome, Reason, Received, Receiver, Report, Sender,
+        message::FrameReport,
+    },
     types::MotorCommand,
 };
 
-pub use upload::{Upload, WORDS};
+pub use upload::{Upload, WORDS, outcome_from_words, outcome_words};
 
 /// Bytes that can wait to be sent: what a tick says at most, and some acknowledgements.
 pub const OUTBOX: usize = 4 * FRAME;
@@ -30,8 +33,22 @@ pub struct Application<'m> {
     autopilot: Autopilot<'m>,
     receiver: Receiver<Commands>,
     voice: Voice,
-    /// Control ticks until the next telemetry report.
+    /// Control ticks since the last telemetry report.
     telemetry: u32,
+    storing: Storing,
+}
+
+/// Whether a model is on its way into the flash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Storing {
+    /// It is not.
+    No,
+    /// A task of lower priority has a piece in work.
+    Piece,
+    /// It has the last one in work.
+    Last,
+    /// A new model flies from the next start on.
+    Stored,
 }
 
 /// Messages to bytes that wait to be sent.
@@ -61,7 +78,7 @@ impl<'m> Application<'m> {
     /// An application that has heard and said nothing.
     pub const fn new() -> Self {
         let voice = Voice { sender: Sender::new(), outbox: Vec::new() };
-        Self { autopilot: Autopilot::new(), receiver: Receiver::new(), voice, telemetry: TELEMETRY_TICKS }
+        Self { autopilot: Autopilot::new(), receiver: Receiver::new(), voice, telemetry: 0, storing: Storing::No }
     }
 
     /// The vehicle.
@@ -72,15 +89,26 @@ impl<'m> Application<'m> {
     /// Takes a byte from the line. A command that concerns the flash is for a task which may wait; its outcome is for
     /// [`Application::acknowledge`].
     pub fn hear(&mut self, byte: u8) -> Option<Upload> {
-        let Self { autopilot, receiver, voice, .. } = self;
+        let Self { autopilot, receiver, voice, storing, .. } = self;
         let (sequence, outcome) = match receiver.push(byte)? {
             Ok(Received { sequence, order, message }) => {
-                let upload = Upload::new(sequence, &message);
-                if upload.is_some() && order != Order::Late {
-                    if !autopilot.armed() {
-                        return upload;
-                    }
-                    (sequence, Outcome::Refused(Reason::Armed))
+                let upload = Upload::new(sequence, &message).filter(|_| order != Order::Late);
+                let in_work = matches!(storing, Storing::Piece | Storing::Last);
+                if let Some(upload) = upload {
+                    let reason = if autopilot.armed() {
+                        Reason::Armed
+                    } else if in_work {
+                        Reason::Busy
+                    } else {
+                        if *storing == Storing::No {
+                            *storing = if upload.commits() { Storing::Last } else { Storing::Piece };
+                        }
+                        return Some(upload);
+                    };
+                    (sequence, Outcome::Refused(reason))
+                } else if *storing != Storing::No && message == Command::Arm && order != Order::Late {
+                    // The core stands still while the flash is erased.
+                    (sequence, Outcome::Refused(Reason::Busy))
                 } else {
                     match autopilot.obey(&Received { sequence, order, message }) {
                         Reaction::Silence => return None,
@@ -101,7 +129,21 @@ impl<'m> Application<'m> {
 
     /// Tells the sender what became of a command that a task of lower priority carried out.
     pub fn acknowledge(&mut self, sequence: u8, outcome: Outcome) {
+        self.storing = match (self.storing, outcome) {
+            (Storing::Stored, _) | (Storing::Last, Outcome::Done) => Storing::Stored,
+            _ => Storing::No,
+        };
         self.voice.say(&Report::Acknowledge { sequence, outcome });
+    }
+
+    /// Whether a task of lower priority has a piece of a model in work, so that the core may stand still for seconds.
+    pub fn storing(&self) -> bool {
+        matches!(self.storing, Storing::Piece | Storing::Last)
+    }
+
+    /// Whether a new model waits to be flown from the next start on. Until then the vehicle is not armed.
+    pub fn restart_due(&self) -> bool {
+        self.storing == Storing::Stored
     }
 
     /// Whether a new attitude came since the last tick.
@@ -121,9 +163,9 @@ impl<'m> Application<'m> {
         if flew {
             self.voice.say(&Report::Motors(self.autopilot.motors(&command)));
         }
-        self.telemetry = self.telemetry.saturating_sub(1);
-        if self.telemetry == 0 {
-            self.telemetry = TELEMETRY_TICKS;
+        self.telemetry = self.telemetry.saturating_add(1);
+        if self.telemetry >= TELEMETRY_TICKS {
+            self.telemetry = 0;
             let frames = self.frames();
             self.voice.say(&Report::Telemetry(self.autopilot.telemetry(meters, frames)));
         }

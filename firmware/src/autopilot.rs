@@ -135,6 +135,11 @@ impl<'m> Autopilot<'m> {
         self.armed
     }
 
+    /// Whether a control tick was flown since the motors were armed.
+    pub fn in_flight(&self) -> bool {
+        self.armed && self.tick.0 > 0
+    }
+
     /// Whether a new attitude came since the last tick.
     pub fn informed(&self) -> bool {
         self.news.informed()

@@ -150,11 +150,20 @@ impl<'m> Flight<'m> {
     /// # Errors
     /// If the model is for other signals, another rate, or a longer preview.
     pub fn attach(&mut self, model: &'m Model<'m>, settings: &Settings, lanes: Lanes) -> Result<(), Refusal> {
-        let mut adapter = Adapter::new(model, &quadrotor::signals(), settings.rates.reference_hz(), PREVIEW)?;
+        Self::accepts(model, &settings.rates)?;
+        let adapter = self.adapter.insert(Adapter::tied(model, base_channels()));
         adapter.defer();
         adapter.switch(lanes);
-        self.adapter = Some(adapter);
         Ok(())
+    }
+
+    /// Whether [`Flight::attach`] takes a model.
+    ///
+    /// # Errors
+    /// As [`Flight::attach`].
+    #[inline(never)]
+    pub fn accepts(model: &Model<'_>, rates: &Rates) -> Result<(), Refusal> {
+        QuadrotorAdapter::check(model, &quadrotor::signals(), rates.reference_hz(), PREVIEW)
     }
 
     /// The add-on, if there is one.
@@ -249,6 +258,12 @@ impl<'m> Flight<'m> {
             adapter.deliver(inference);
         }
     }
+}
+
+/// Not inlined: the table takes 1.4 KB of the stack.
+#[inline(never)]
+fn base_channels() -> [usize; REFERENCE] {
+    QuadrotorAdapter::base(&quadrotor::signals())
 }
 
 /// The reference at a reference tick, and the network's job if there is one.

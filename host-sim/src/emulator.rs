@@ -22,14 +22,20 @@ use wait_timeout::ChildExt;
 /// The microcontroller's target.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
+/// How what flies on a vehicle is built: small.
+pub const BOARD: &str = "board";
+/// How what is measured in instructions is built: fast.
+pub const FIRMWARE: &str = "firmware";
+
 /// Names the folder of a toolchain with [`TARGET`], where rustup cannot provide it (see `tests/thumb-toolchain.sh`).
 pub const TOOLCHAIN_VARIABLE: &str = "IMPROMPTU_THUMB_TOOLCHAIN";
 
 /// Variables that would change the build (flags of a coverage or sanitiser run, another target, a wrapper) and with it the
 /// instruction counts, or break it. The model is named by the test alone.
-const FOREIGN_VARIABLES: [&str; 10] = [
+const FOREIGN_VARIABLES: [&str; 11] = [
     "IMPROMPTU_MODEL",
     "IMPROMPTU_MCU_IMAGES",
+    "IMPROMPTU_FLASH_OFFSET",
     "RUSTFLAGS",
     "CARGO_ENCODED_RUSTFLAGS",
     "CARGO_BUILD_RUSTFLAGS",
@@ -60,11 +66,11 @@ impl Output {
     }
 }
 
-/// Builds the binary `bin` of a package as it is flashed, with additional variables in its environment, and gives the ELF file.
+/// Builds the binary `bin` of a package with a profile ([`BOARD`], [`FIRMWARE`]), with additional variables in its environment, and gives the ELF file.
 ///
 /// Once for each environment in a run of the tests. Cargo works in a target folder of its own, so that it neither waits for the build
 /// that runs the tests nor disturbs it.
-pub fn build_firmware(package: &str, bin: &str, environment: &[(&str, &str)]) -> Result<PathBuf> {
+pub fn build_firmware(package: &str, bin: &str, profile: &str, environment: &[(&str, &str)]) -> Result<PathBuf> {
     static BUILT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
     let folder = target_folder();
     let mut variant = DefaultHasher::new();
@@ -72,13 +78,13 @@ pub fn build_firmware(package: &str, bin: &str, environment: &[(&str, &str)]) ->
     let elf = folder.join(format!("{bin}-{:016x}.elf", variant.finish()));
     let mut built = BUILT.lock().unwrap_or_else(PoisonError::into_inner);
     if !built.contains(&elf) {
-        build(package, bin, environment, &folder, &elf)?;
+        build(package, bin, profile, environment, &folder, &elf)?;
         built.insert(elf.clone());
     }
     Ok(elf)
 }
 
-fn build(package: &str, bin: &str, environment: &[(&str, &str)], folder: &Path, elf: &Path) -> Result<()> {
+fn build(package: &str, bin: &str, profile: &str, environment: &[(&str, &str)], folder: &Path, elf: &Path) -> Result<()> {
     require_target()?;
     fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
     // Held until the ELF is copied: a build with another environment, in another process, writes to the same name.
@@ -87,7 +93,7 @@ fn build(package: &str, bin: &str, environment: &[(&str, &str)], folder: &Path, 
     let built = tool("cargo")
         .current_dir(workspace())
         .args(["build", "--package", package, "--bin", bin])
-        .args(["--target", TARGET, "--profile", "firmware", "--locked"])
+        .args(["--target", TARGET, "--profile", profile, "--locked"])
         .arg("--target-dir")
         .arg(folder)
         .envs(environment.iter().copied())
@@ -96,7 +102,7 @@ fn build(package: &str, bin: &str, environment: &[(&str, &str)], folder: &Path, 
     ensure!(built.status.success(), "the firmware does not build:\n{}", String::from_utf8_lossy(&built.stderr));
     // Renamed when complete: another process may be starting the same board.
     let copy = folder.join("emulator.copy");
-    fs::copy(folder.join(TARGET).join("firmware").join(bin), &copy)
+    fs::copy(folder.join(TARGET).join(profile).join(bin), &copy)
         .and_then(|_| fs::rename(&copy, elf))
         .with_context(|| format!("cannot copy the binary to {}", elf.display()))
 }
@@ -130,8 +136,8 @@ pub fn run_with(further: &[&str], elf: &Path, working_dir: &Path, timeout: Durat
     Ok(Output { status, stdout, stderr })
 }
 
-/// The emulator as cargo would start it, but with this virtual clock and this serial port; the ELF file comes next.
-pub fn command(icount: &str, serial: &str) -> Result<Command> {
+/// The emulator as cargo would start it, but with further arguments, this virtual clock and this serial port; the ELF file comes next.
+pub fn command(further: &[&str], icount: &str, serial: &str) -> Result<Command> {
     let mut runner = runner()?;
     for (option, value) in [("-icount", icount), ("-serial", serial)] {
         let place = runner.iter().position(|word| word == option).and_then(|place| runner.get_mut(place + 1));
@@ -139,7 +145,7 @@ pub fn command(icount: &str, serial: &str) -> Result<Command> {
     }
     let (program, arguments) = runner.split_first().context("the runner is empty")?;
     let mut command = Command::new(program);
-    command.args(arguments);
+    command.args(further).args(arguments);
     Ok(command)
 }
 

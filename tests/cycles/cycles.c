@@ -23,7 +23,7 @@
 
 EXPORT int qemu_plugin_version = PLUGIN_API;
 
-enum { WAIT_STATES = 5, LINE_SHIFT = 4, CODE_LINES = 64, DATA_LINES = 8, FLASH_SIZE = 1 << 20, MAX_ENTRIES = 1024 };
+enum { WAIT_STATES = 5, LINE_SHIFT = 4, CODE_LINES = 64, DATA_LINES = 8, FLASH_SIZE = 1 << 20, MAX_ENTRIES = 1 << 14 };
 
 struct entry {
     uint64_t instructions, cycles, code_waits, data_waits, lowest_store;

@@ -8,7 +8,7 @@ use impromptu_firmware::{
     replay::{ANSWER, Recorded},
 };
 
-use crate::emulator::{Output, build_firmware, run, target_folder};
+use crate::emulator::{FIRMWARE, Output, build_firmware, run, target_folder};
 
 /// Far more than a flight needs: about a second for 7,500 ticks.
 const TIMEOUT: Duration = Duration::from_secs(120);
@@ -29,7 +29,7 @@ const ANSWER_NAMES: [&str; ANSWER / 4] = [
 
 /// Builds the emulated board with the bytes of a model file in its flash, or with none; gives the ELF file.
 pub fn build(model: Option<&[u8]>) -> Result<PathBuf> {
-    let Some(bytes) = model else { return build_firmware("impromptu-firmware", "netduinoplus2", &[]) };
+    let Some(bytes) = model else { return build_firmware("impromptu-firmware", "netduinoplus2", FIRMWARE, &[]) };
     let folder = target_folder().join("models");
     fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
     let path = folder.join(format!("{:08x}.model", file::checksum(bytes)));
@@ -38,7 +38,7 @@ pub fn build(model: Option<&[u8]>) -> Result<PathBuf> {
     }
     let path = path.canonicalize()?;
     let path = path.to_str().context("the target folder's name is not Unicode")?;
-    build_firmware("impromptu-firmware", "netduinoplus2", &[("IMPROMPTU_MODEL", path)])
+    build_firmware("impromptu-firmware", "netduinoplus2", FIRMWARE, &[("IMPROMPTU_MODEL", path)])
 }
 
 /// Starts the board with a recording in its folder, named after the flight `name`; gives what it printed, and the answers if it wrote any.

@@ -4,7 +4,7 @@ use std::{fs, path::PathBuf, time::Duration};
 
 use impromptu_tests::{
     board,
-    emulator::{build_firmware, run},
+    emulator::{FIRMWARE, build_firmware, run},
 };
 
 use crate::board::{flight, model};
@@ -60,7 +60,7 @@ fn a_damaged_model_ends_the_board_with_the_refusal() {
 
 #[test]
 fn a_board_that_does_not_end_is_stopped() {
-    let elf = build_firmware("impromptu-firmware", "netduinoplus2", &[]).unwrap();
+    let elf = build_firmware("impromptu-firmware", "netduinoplus2", FIRMWARE, &[]).unwrap();
     let error = run(&elf, &folder("emulator-timeout"), Duration::ZERO).unwrap_err();
     assert!(error.to_string().contains("did not end within 0 s"), "{error}");
 }

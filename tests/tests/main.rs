@@ -8,11 +8,13 @@
 //! - [`guard`]: lanes that do harm are handed over before the error is 1.5 times the baseline's, with numbers;
 //! - [`emulator`]: the emulator is found, fails loudly, and counts repeatably;
 //! - [`mcu`]: what kernels cost on the microcontroller, beside other engines, with a golden table;
+//! - [`image`]: what is flashed is within its budget, leaves the models alone, and starts behind a boot loader;
 //! - [`kernels`]: the network kernels in assembly give the bits of their portable twin;
 //! - [`link`]: any bytes on the link are refused or messages, never a panic;
 //! - [`processor`]: control is never late, whatever the network takes; the processor's share; late inferences;
 //! - [`pil`]: the flashed binary flies the plant, bit for bit, through good lines and bad ones;
-//! - [`unsafe_code`]: there is none but those kernels, each block with its reason.
+//! - [`unsafe_code`]: there is none but those kernels, each block with its reason;
+//! - [`upload`]: a model goes over the link into the flash, and flies from the next start on.
 //!
 //! The parts have tests of their own: plant against an independent simulator and every generator and parser in `host-sim`, model
 //! files bit by bit damaged in `model-export`, kernels and values in `firmware`.
@@ -24,9 +26,11 @@ mod demo;
 mod elf;
 mod emulator;
 mod guard;
+mod image;
 mod kernels;
 mod link;
 mod mcu;
 mod pil;
 mod processor;
 mod unsafe_code;
+mod upload;

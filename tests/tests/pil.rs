@@ -61,7 +61,7 @@ fn with_faults(faults: Faults) -> Flown {
     let trajectory = strokes(1, 1, 1.0, plant.rate_hz()).unwrap().remove(0);
     let file = model::file(&model::TANH, Precision::Int8);
     let model = Model::from_bytes(&file).unwrap();
-    let (_emulated, line) = pil::connect(&pil::firmware().unwrap(), Some(&file), LinkKind::Lockstep, 3).unwrap();
+    let (_emulated, line) = pil::connect(&pil::firmware().unwrap(), &[], Some(&file), LinkKind::Lockstep, 3).unwrap();
     let mut board = Board::new(Faulty::new(line, Faults { first: TAKE_OFF, ..faults }, 11), true);
     board.introduce().unwrap();
     let mut flight = board.prepare(&plant.settings, Some(Lanes::BOTH)).unwrap();

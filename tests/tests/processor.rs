@@ -67,7 +67,7 @@ fn a_whole_flight_takes_a_small_share_of_the_processor() {
     let plugin = format!("{},out={}", counter::build().unwrap().display(), counts.path().display());
     let further = ["-plugin", &plugin];
     let elf = pil::firmware().unwrap();
-    let (mut emulated, line) = pil::connect_with(&further, &elf, Some(&file), LinkKind::Lockstep, 3).unwrap();
+    let (mut emulated, line) = pil::connect(&elf, &further, Some(&file), LinkKind::Lockstep, 3).unwrap();
     let mut board = Board::new(line, true);
     board.introduce().unwrap();
     let plan = FlightPlan::new(&trajectory, 3).with(&model, Lanes::BOTH);

@@ -1,8 +1,13 @@
 //! A piece of a model upload on its way to the task that may wait for the flash.
 //!
-//! *in* the link's model commands; *out* words for a mailbox, and back; *never* other bytes than were sent; *source* ours.
+//! *in* the link's model commands; *out* words for a mailbox, and back, and the outcome once carried out; *never* other bytes than were
+//! sent; *source* ours.
 
-use crate::link::{CHUNK, Command, message::ModelChunk};
+use crate::{
+    link::{CHUNK, Command, Outcome, Reason, message::ModelChunk},
+    model::{Model, Refusal},
+    storage::{Arming, Slot, StorageError, Uploader},
+};
 
 /// Words of an upload in a mailbox: kind, sequence and length; two numbers; the bytes.
 pub const WORDS: usize = 3 + CHUNK / 4;
@@ -46,6 +51,33 @@ impl Upload {
         Some(Self { sequence, words })
     }
 
+    /// Whether this is the last piece, after which the new model waits for the restart.
+    pub fn commits(&self) -> bool {
+        self.words[0] & 0xff == COMMIT
+    }
+
+    /// Carries the command out, which may take seconds; the motors must be off until it returns ([`super::Application::hear`] sees to
+    /// that). `check` as for [`Uploader::commit`]. A beginning of what had begun before is answered with the offset where it goes on.
+    pub fn carry_out<S: Slot>(
+        &self,
+        uploader: &mut Uploader<S>,
+        check: impl FnOnce(&Model<'_>) -> Result<(), Refusal>,
+    ) -> Outcome {
+        let stored = self.with(|command| match command {
+            Command::ModelBegin { length, checksum } => match uploader.begin(Arming::Disarmed, length, checksum) {
+                Ok(0) => Ok(()),
+                Ok(expected) => Err(StorageError::Gap { expected, found: 0 }),
+                Err(error) => Err(error),
+            },
+            Command::ModelChunk(chunk) => uploader.write(Arming::Disarmed, chunk.offset, chunk.bytes).map(|_| ()),
+            _ => uploader.commit(Arming::Disarmed, check).map(|_| ()),
+        });
+        match stored {
+            Ok(()) => Outcome::Done,
+            Err(error) => Outcome::Refused(reason(&error)),
+        }
+    }
+
     /// The words for a mailbox.
     pub fn words(&self) -> &[u32; WORDS] {
         &self.words
@@ -74,10 +106,99 @@ impl Upload {
     }
 }
 
+/// What the link says of an error of the storage.
+fn reason(error: &StorageError) -> Reason {
+    match *error {
+        StorageError::Armed => Reason::Armed,
+        StorageError::NotBegun => Reason::NoModel,
+        StorageError::TooLong { room, .. } => Reason::Length { limit: room },
+        StorageError::Overrun { length, .. } => Reason::Length { limit: length },
+        StorageError::Gap { expected, .. } => Reason::Offset { expected },
+        StorageError::Incomplete { received, .. } => Reason::Offset { expected: received },
+        StorageError::Checksum { computed, .. } => Reason::Checksum { computed },
+        StorageError::Refused(refusal) => Reason::Model((&refusal).into()),
+        StorageError::Restart => Reason::Busy,
+        _ => Reason::Storage,
+    }
+}
+
+/// An outcome as words for a mailbox.
+pub fn outcome_words(outcome: &Outcome) -> [u32; 2] {
+    let mut bytes = [0; 8];
+    // The largest has seven bytes.
+    let _ = postcard::to_slice(outcome, &mut bytes);
+    let [a, b, c, d, e, f, g, h] = bytes;
+    [u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h])]
+}
+
+/// The outcome that was put into a mailbox as these words.
+pub fn outcome_from_words(words: [u32; 2]) -> Option<Outcome> {
+    let [first, second] = words.map(u32::to_le_bytes);
+    let mut bytes = [0; 8];
+    for (place, byte) in bytes.iter_mut().zip(first.into_iter().chain(second)) {
+        *place = byte;
+    }
+    postcard::from_bytes(&bytes).ok()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{
+        link::outcome::ModelFault,
+        model::file,
+        storage::{self, RamFlash},
+    };
     use proptest::prelude::*;
+
+    const MODEL: &[u8] = include_bytes!("../../../tests/golden/models/int8-lane.model");
+
+    /// The command's outcome, by way of both mailboxes.
+    fn obey<S: Slot>(uploader: &mut Uploader<S>, command: Command<'_>) -> Outcome {
+        let upload = Upload::from_words(*Upload::new(1, &command).unwrap().words());
+        let outcome = upload.carry_out(uploader, |_| Ok(()));
+        assert_eq!(outcome_from_words(outcome_words(&outcome)), Some(outcome));
+        outcome
+    }
+
+    #[test]
+    fn an_upload_is_stored_and_every_refusal_says_where_it_goes_on() {
+        let mut slots = [RamFlash::<4096>::new(), RamFlash::new()];
+        let (_, mut uploader) = storage::open(&mut slots, |_| Ok(()));
+        let begin = Command::ModelBegin { length: MODEL.len() as u32, checksum: file::checksum(MODEL) };
+        let chunk = |offset: usize| {
+            let bytes = MODEL[offset..].chunks(CHUNK).next().unwrap();
+            Command::ModelChunk(ModelChunk { offset: offset as u32, bytes })
+        };
+        let refused = Outcome::Refused;
+        assert_eq!(obey(&mut uploader, Command::ModelCommit), refused(Reason::NoModel));
+        assert_eq!(
+            obey(&mut uploader, Command::ModelBegin { length: 5000, checksum: 0 }),
+            refused(Reason::Length { limit: 4064 })
+        );
+        assert_eq!(obey(&mut uploader, begin), Outcome::Done);
+        assert_eq!(obey(&mut uploader, chunk(CHUNK)), refused(Reason::Offset { expected: 0 }));
+        assert_eq!(obey(&mut uploader, chunk(0)), Outcome::Done);
+        assert_eq!(obey(&mut uploader, begin), refused(Reason::Offset { expected: CHUNK as u32 }));
+        assert_eq!(obey(&mut uploader, Command::ModelCommit), refused(Reason::Offset { expected: CHUNK as u32 }));
+        for offset in (CHUNK..MODEL.len()).step_by(CHUNK) {
+            assert_eq!(obey(&mut uploader, chunk(offset)), Outcome::Done);
+        }
+        assert_eq!(obey(&mut uploader, Command::ModelCommit), Outcome::Done);
+        assert_eq!(obey(&mut uploader, begin), refused(Reason::Busy), "until the restart");
+        assert_eq!(storage::open(&mut slots, |_| Ok(())).0.unwrap().file(), MODEL);
+    }
+
+    #[test]
+    fn a_model_that_is_none_is_refused_as_such() {
+        let mut slots = [RamFlash::<4096>::new(), RamFlash::new()];
+        let (_, mut uploader) = storage::open(&mut slots, |_| Ok(()));
+        let bytes = &[7; 40];
+        let checksum = file::checksum(bytes);
+        obey(&mut uploader, Command::ModelBegin { length: 40, checksum });
+        obey(&mut uploader, Command::ModelChunk(ModelChunk { offset: 0, bytes }));
+        assert_eq!(obey(&mut uploader, Command::ModelCommit), Outcome::Refused(Reason::Model(ModelFault::Damaged)));
+    }
 
     proptest! {
         #[test]

@@ -80,6 +80,7 @@ pub(super) fn reports() -> Vec<Report<'static>> {
         Reason::Model(ModelFault::Signal { channel: 4 }),
         Reason::Model(ModelFault::Preview { needed: 200 }),
         Reason::Model(ModelFault::Rate),
+        Reason::Busy,
     ];
     let mut reports = vec![
         Report::Identity(Identity::new("impromptu 1", None)),
@@ -147,6 +148,7 @@ const PAYLOADS: &str = "
     01a50307010e0404
     01a50307010e05c801
     01a50307010e06
+    01a50307010f
 ";
 /// One frame, with stuffing, check sum and zero.
 const FRAME_OF_LANES: &str = "0501a505010530c4279e00";

@@ -65,6 +65,8 @@ pub enum Reason {
     Storage,
     /// The model file arrived whole, but is not flown.
     Model(ModelFault),
+    /// A piece of a model is in work, or a new model waits for the restart.
+    Busy,
 }
 
 /// Why a model is not flown: [`Refusal`] without what only the file's maker needs.
@@ -134,6 +136,9 @@ impl fmt::Display for Reason {
             }
             Self::Storage => write!(f, "the flash could not be written: upload again; if it stays so, the flash is worn out"),
             Self::Model(fault) => write!(f, "the model is not flown: {fault}"),
+            Self::Busy => {
+                write!(f, "a piece of a model is being stored, or a new model waits for the restart: say it again later")
+            }
         }
     }
 }

@@ -12,6 +12,9 @@ use super::{Section, refusal::Refusal};
 pub struct Floats<'a>(&'a [[u8; 4]]);
 
 impl<'a> Floats<'a> {
+    /// No elements.
+    pub const EMPTY: Self = Self(&[]);
+
     /// Number of elements.
     #[inline]
     pub fn len(&self) -> usize {
@@ -73,7 +76,7 @@ pub struct Blob<'a>(&'a [u8]);
 
 impl<'a> Blob<'a> {
     /// The bulk numbers in `bytes`.
-    pub fn new(bytes: &'a [u8]) -> Self {
+    pub const fn new(bytes: &'a [u8]) -> Self {
         Self(bytes)
     }
 

@@ -68,6 +68,9 @@ impl OutputBounds {
 pub struct Bounds<'a>(Floats<'a>);
 
 impl<'a> Bounds<'a> {
+    /// Of no outputs.
+    pub(super) const EMPTY: Self = Self(Floats::EMPTY);
+
     /// Checks the bounds against themselves and the limits.
     pub(super) fn new(card: &Card<'a>, blob: &Blob<'a>) -> Result<Self, Refusal> {
         let count = if card.network.is_some() { card.outputs.len() } else { 0 };

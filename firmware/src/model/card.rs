@@ -296,6 +296,31 @@ pub struct Card<'a> {
 }
 
 impl Card<'_> {
+    /// Of no model.
+    pub(super) const EMPTY: Self = {
+        let section = Section { offset: 0, length: 0 };
+        Self {
+            name: "",
+            provenance: Provenance { vehicle: "", gains: "", condition: "", software: "", seed: 0, data_crc: 0, remarks: "" },
+            signals: SignalTable { desired: Vec::new(), measured: Vec::new(), reference: Vec::new() },
+            timing: Timing {
+                reference_rate_hz: 0.0,
+                divisor: 0,
+                interpolation: Interpolation::Hold,
+                measurement_delay_ticks: 0.0,
+                fade_ticks: 0,
+            },
+            features: Vec::new(),
+            outputs: Vec::new(),
+            network: None,
+            lane: None,
+            monitor: None,
+            envelope: section,
+            bounds: section,
+            probes: Probes { count: 0, network: section, lane: section },
+        }
+    };
+
     /// Reference ticks of the past and of the future that the features and the lane read.
     pub fn preview_span(&self) -> (u32, u32) {
         let divisor = u32::from(self.timing.divisor);

@@ -7,6 +7,7 @@ mod blob;
 mod bounds;
 mod card;
 mod counts;
+mod decode;
 pub mod file;
 mod place;
 mod refusal;
@@ -34,34 +35,69 @@ pub struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
+    /// No model: where [`Model::load_into`] puts one.
+    pub const VACANT: Self = Self {
+        card: Card::EMPTY,
+        blob: Blob::new(&[]),
+        network: None,
+        lane: None,
+        monitor: None,
+        envelope: (Floats::EMPTY, Floats::EMPTY),
+        bounds: Bounds::EMPTY,
+        checksum: 0,
+    };
+
     /// Checks a model file and borrows its numbers.
     ///
     /// # Errors
     /// A [`Refusal`] that names what is wrong: header, check sum, card, shapes, indices, values, probes.
     pub fn from_bytes(bytes: &'a [u8]) -> Result<Self, Refusal> {
-        let (card, blob) = file::split(bytes)?;
-        let (card, rest) = postcard::take_from_bytes::<Card<'a>>(card).map_err(|_| counts::refusal(card))?;
-        if !rest.is_empty() {
-            return Err(Refusal::Card);
+        let mut model = Self::VACANT;
+        model.load(bytes)?;
+        Ok(model)
+    }
+
+    /// [`Model::from_bytes`] into `place`: for a model in a static, since 3 KB are much for the stack of a microcontroller. After a
+    /// refusal it has neither network nor lane.
+    ///
+    /// # Errors
+    /// As [`Model::from_bytes`].
+    pub fn load_into<'p>(place: &'p mut Self, bytes: &'a [u8]) -> Result<&'p Self, Refusal> {
+        if let Err(refusal) = place.load(bytes) {
+            (place.network, place.lane) = (None, None);
+            return Err(refusal);
         }
-        let blob = Blob::new(blob);
-        validate::card(&card)?;
-        let network = match &card.network {
-            Some(layout) => Some(Network::new(layout, &blob, card.features.len(), card.outputs.len())?),
+        Ok(place)
+    }
+
+    #[inline(never)]
+    fn load(&mut self, bytes: &'a [u8]) -> Result<(), Refusal> {
+        let Self { card, blob, network, lane, monitor, envelope, bounds, checksum } = self;
+        let (card_bytes, blob_bytes) = file::split(bytes)?;
+        match decode::card(card_bytes, card) {
+            Some([]) => {}
+            Some(_) => return Err(Refusal::Card),
+            None => return Err(counts::refusal(card_bytes)),
+        }
+        *blob = Blob::new(blob_bytes);
+        validate::card(card)?;
+        *network = match &card.network {
+            Some(layout) => Some(Network::new(layout, blob, card.features.len(), card.outputs.len())?),
             None => None,
         };
-        let lane = match &card.lane {
-            Some(layout) => Some(Lane::new(layout, &blob)?),
+        *lane = match &card.lane {
+            Some(layout) => Some(Lane::new(layout, blob)?),
             None => None,
         };
-        let monitor = card.monitor.as_ref().map(|layout| Monitor::new(layout, &blob)).transpose()?;
-        let envelope = blob.floats(card.envelope, 2 * card.features.len(), "envelope")?.split_at(card.features.len());
+        *envelope = blob.floats(card.envelope, 2 * card.features.len(), "envelope")?.split_at(card.features.len());
         if envelope.0.iter().zip(envelope.1.iter()).any(|(low, high)| low > high) {
             return Err(Refusal::Value { what: "envelope" });
         }
-        let bounds = Bounds::new(&card, &blob)?;
-        validate::probes(&card, &blob, network.as_ref().map(|network| (network, &envelope, &bounds)), lane.as_ref())?;
-        Ok(Self { card, blob, network, lane, monitor, envelope, bounds, checksum: file::checksum(bytes) })
+        *monitor = card.monitor.as_ref().map(|layout| Monitor::new(layout, blob)).transpose()?;
+        *bounds = Bounds::new(card, blob)?;
+        validate::probes(card, blob, network.as_ref().map(|network| (network, &*envelope, &*bounds)), lane.as_ref())?;
+        *checksum = file::checksum(bytes);
+        Ok(())
     }
 
     /// What the model says of itself.

@@ -11,8 +11,8 @@ use super::Slot;
 
 /// A slot of `BYTES` bytes, erased as a whole and written byte by byte, as a sector of the STM32F405. What it holds is lost without power.
 ///
-/// A static of it should be filled at run time (`StaticCell::init_with(|| [RamFlash::new(), RamFlash::new()])`): erased bytes are not
-/// zero, so a constant would take as much flash as RAM.
+/// A static of it should be [`RamFlash::written`], which start-up code clears: erased bytes are not zero, so they would take as much flash
+/// as RAM.
 #[derive(Clone, Debug)]
 #[repr(C, align(16))]
 pub struct RamFlash<const BYTES: usize>([u8; BYTES]);
@@ -21,6 +21,11 @@ impl<const BYTES: usize> RamFlash<BYTES> {
     /// Erased memory.
     pub const fn new() -> Self {
         Self([0xff; BYTES])
+    }
+
+    /// Memory of zeros, which can only be erased.
+    pub const fn written() -> Self {
+        Self([0; BYTES])
     }
 }
 

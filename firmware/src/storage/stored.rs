@@ -85,6 +85,13 @@ pub struct Survey<'a> {
     pub sequence: Sequence,
 }
 
+/// Whether a file is a model that flies here.
+#[inline(never)]
+pub(super) fn examine(file: &[u8], check: impl FnOnce(&Model<'_>) -> Result<(), Refusal>) -> Result<(), Refusal> {
+    let mut place = Model::VACANT;
+    check(Model::load_into(&mut place, file)?)
+}
+
 /// Looks at both slots; `check` says whether a model fits the application (signals, rate, preview).
 pub fn survey<'a>(slots: [&'a [u8]; 2], check: impl Fn(&Model<'_>) -> Result<(), Refusal>) -> Survey<'a> {
     let [first, second] = slots.map(|slot| Stored::read(slot).ok());
@@ -94,7 +101,7 @@ pub fn survey<'a>(slots: [&'a [u8]; 2], check: impl Fn(&Model<'_>) -> Result<(),
     };
     let intact = newest_first.into_iter().filter_map(|(place, stored)| Some((place, stored?)));
     let newest = intact.clone().next();
-    let flies = intact.clone().find(|(_, stored)| Model::from_bytes(stored.file).and_then(|model| check(&model)).is_ok());
+    let flies = intact.clone().find(|(_, stored)| examine(stored.file, &check).is_ok());
     Survey {
         flies: flies.map(|(_, stored)| stored),
         spare: flies.or(newest).map_or(Place::First, |(place, _)| place.other()),

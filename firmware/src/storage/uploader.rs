@@ -3,7 +3,7 @@
 //! *in* announcement, chunks and the word to commit, from whatever link; *out* acknowledgements, at last the stored model; *never* a write
 //! while armed, nor a header before a model that this machine would fly; *source* the two-slot update with a commit record written last.
 
-use super::{HEADER, Header, Operation, Sequence, Slot, StorageError, Stored};
+use super::{HEADER, Header, Operation, Sequence, Slot, StorageError, Stored, stored::examine};
 use crate::model::{Model, Refusal, file};
 
 /// Bytes that are collected for one write to the flash: a multiple of every driver's granularity.
@@ -158,7 +158,7 @@ impl<S: Slot> Uploader<S> {
         if computed != announced {
             return Err(StorageError::Checksum { announced, computed });
         }
-        check(&Model::from_bytes(file)?)?;
+        examine(file, check)?;
         let header = Header { sequence: self.sequence, length, checksum: announced }.to_bytes();
         self.slot.write(0, &header).map_err(|error| StorageError::flash(Operation::WriteHeader, &error))?;
         if self.slot.bytes().starts_with(&header) { Ok(()) } else { Err(StorageError::ReadBack) }

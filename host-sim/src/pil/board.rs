@@ -7,7 +7,7 @@ use impromptu_firmware::{
     flight::Settings,
     guard::Trips,
     link::{
-        Command, FRAME, Outcome, Receiver, Report, Reports, Sender,
+        Command, FRAME, Outcome, Reason, Receiver, Report, Reports, Sender,
         message::{Inertial, LaneReport, Position, Telemetry, TimedSetpoint},
     },
     types::{MotorCommand, Reference, Setpoint, State, Tick},
@@ -22,6 +22,12 @@ use crate::rollout::FlightStack;
 const PATIENCE: Duration = Duration::from_millis(500);
 /// Bytes that the firmware's queue of a serial line takes at once.
 const QUEUE: usize = 1024;
+
+/// A piece of a model among the commands.
+const PIECE: &str = "a piece of the model";
+/// How often a piece is sent, and how many control ticks in lockstep its outcome is awaited: a commit runs the model's probes.
+const ATTEMPTS: usize = 50;
+const LOCKSTEP_WAIT: usize = 25;
 
 /// What the microcontroller measured of itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -52,14 +58,16 @@ pub struct Board<L> {
     telemetry: Telemetry,
     /// What the last exchange brought.
     motors: Option<(Tick, MotorCommand, Reference)>,
-    refusals: Vec<(&'static str, impromptu_firmware::link::Reason)>,
+    refusals: Vec<(&'static str, Reason)>,
     /// Commands whose acknowledgement is awaited.
     awaited: Vec<(u8, &'static str)>,
     model: Option<Option<u32>>,
     /// Reports that did not arrive.
     lost: u32,
     failure: Option<std::io::Error>,
-    lockstep: bool,
+    pub(super) lockstep: bool,
+    /// What became of the piece of a model that was sent last.
+    pub(super) stored: Option<Outcome>,
 }
 
 impl<L: Line> Board<L> {
@@ -78,6 +86,7 @@ impl<L: Line> Board<L> {
             lost: 0,
             failure: None,
             lockstep,
+            stored: None,
         }
     }
 
@@ -136,12 +145,44 @@ impl<L: Line> Board<L> {
         self.line.end();
     }
 
+    /// Sends a piece of a model, as often as it takes to hear its outcome.
+    pub(super) fn store(&mut self, piece: &Command<'_>) -> Result<Outcome, PilError> {
+        // Answers to earlier pieces are of no interest.
+        self.awaited.clear();
+        for _ in 0..ATTEMPTS {
+            self.refusals.clear();
+            self.stored = None;
+            // Ends whatever the line has invented.
+            self.outgoing.push(0);
+            self.tell(PIECE, piece);
+            self.talk(|board| board.stored.is_some());
+            for _ in 0..LOCKSTEP_WAIT {
+                if self.stored.is_some() || !self.lockstep {
+                    break;
+                }
+                self.talk(|_| true);
+            }
+            if self.failure.is_some() {
+                return Err(self.failed(PIECE));
+            }
+            match self.stored {
+                // An answer to an earlier attempt is on its way, or comes again.
+                None | Some(Outcome::Refused(Reason::Busy)) => {}
+                Some(outcome) => return Ok(outcome),
+            }
+        }
+        match self.stored {
+            Some(Outcome::Refused(reason)) => Err(PilError::Refused { command: PIECE, reason }),
+            _ => Err(PilError::Silence(PIECE)),
+        }
+    }
+
     fn tell(&mut self, name: &'static str, command: &Command<'_>) {
         let mut frame = [0; FRAME];
         // Every command of this file fits into a frame.
         let Some((sequence, frame)) = self.sender.encode(command, &mut frame) else { return };
         self.outgoing.extend(frame);
-        if matches!(command, Command::Settings(_) | Command::Lanes(_) | Command::Arm | Command::Disarm) {
+        if !matches!(command, Command::Hello | Command::Inertial(_) | Command::Position(_) | Command::Setpoint(_)) {
             self.awaited.push((sequence, name));
         }
     }
@@ -181,7 +222,9 @@ impl<L: Line> Board<L> {
                     Report::Acknowledge { sequence, outcome } => {
                         let place = self.awaited.iter().position(|(awaited, _)| *awaited == sequence);
                         let command = place.map_or("a command", |place| self.awaited.remove(place).1);
-                        if let Outcome::Refused(reason) = outcome {
+                        if command == PIECE {
+                            self.stored = Some(outcome);
+                        } else if let Outcome::Refused(reason) = outcome {
                             self.refusals.push((command, reason));
                         }
                     }

@@ -11,7 +11,7 @@ use anyhow::{Context as _, Result};
 use clap::ValueEnum;
 use tempfile::TempDir;
 
-use super::{Board, Line, PilError, line};
+use super::{Board, Line, PilError, flash, line};
 use crate::emulator;
 
 /// How long the board may take to start.
@@ -31,7 +31,13 @@ pub enum LinkKind {
 pub struct Emulated {
     child: Child,
     folder: TempDir,
+    elf: PathBuf,
+    link: LinkKind,
+    shift: u32,
 }
+
+/// Files that stand for the slots of the flash: the firmware writes them when it stores a model.
+const SLOTS: [&str; 2] = ["slot0.bin", "slot1.bin"];
 
 impl Drop for Emulated {
     fn drop(&mut self) {
@@ -62,7 +68,7 @@ impl Emulated {
 /// # Errors
 /// If the target is missing, with the line that installs it, or the build fails.
 pub fn firmware() -> Result<PathBuf> {
-    emulator::build_firmware("impromptu-board", "emulated", &[])
+    emulator::build_firmware("impromptu-board", "emulated", emulator::BOARD, &[])
 }
 
 /// Builds the firmware if need be, starts it with the bytes of a model file, or with none, and opens the line. `shift`: an instruction
@@ -71,19 +77,53 @@ pub fn firmware() -> Result<PathBuf> {
 /// # Errors
 /// If the target or the emulator is missing, with the line that installs it; if the firmware does not start.
 pub fn start(model: Option<&[u8]>, link: LinkKind, shift: u32) -> Result<(Emulated, Board<Box<dyn Line>>), PilError> {
-    let (emulated, line) = connect(&firmware()?, model, link, shift)?;
+    let (emulated, line) = connect(&firmware()?, &[], model, link, shift)?;
     Ok((emulated, Board::new(line, link == LinkKind::Lockstep)))
 }
 
-/// [`start`] with a binary that is built, to the line alone.
+/// [`start`] with a binary that is built and further arguments for the emulator, to the line alone.
 ///
 /// # Errors
 /// If the emulator is missing or the firmware does not start.
-pub fn connect(elf: &Path, model: Option<&[u8]>, link: LinkKind, shift: u32) -> Result<(Emulated, Box<dyn Line>), PilError> {
+pub fn connect(
+    elf: &Path,
+    further: &[&str],
+    model: Option<&[u8]>,
+    link: LinkKind,
+    shift: u32,
+) -> Result<(Emulated, Box<dyn Line>), PilError> {
     let folder = TempDir::new().context("cannot make a folder for the emulator")?;
     if let Some(bytes) = model {
-        fs::write(folder.path().join("model.impromptu"), bytes).context("cannot write the model")?;
+        fs::write(folder.path().join(SLOTS[0]), flash::slot(bytes)).context("cannot write the model")?;
     }
+    power(folder, elf.to_owned(), further, link, shift)
+}
+
+/// Power off and on again: the models in flash stay.
+///
+/// # Errors
+/// As [`start`].
+pub fn restart(mut emulated: Emulated) -> Result<(Emulated, Board<Box<dyn Line>>), PilError> {
+    let _ = emulated.child.kill();
+    let _ = emulated.child.wait();
+    let folder = std::mem::replace(&mut emulated.folder, TempDir::new().context("cannot make a folder")?);
+    let link = emulated.link;
+    let (emulated, line) = power(folder, emulated.elf.clone(), &[], link, emulated.shift)?;
+    Ok((emulated, Board::new(line, link == LinkKind::Lockstep)))
+}
+
+/// Starts the emulator in a folder with what its flash holds.
+fn power(
+    folder: TempDir,
+    elf: PathBuf,
+    further: &[&str],
+    link: LinkKind,
+    shift: u32,
+) -> Result<(Emulated, Box<dyn Line>), PilError> {
+    let slots = SLOTS.map(|name| fs::read(folder.path().join(name)).unwrap_or_default());
+    let flashed = folder.path().join("flashed.elf");
+    let program = fs::read(&elf).with_context(|| format!("cannot read {}", elf.display()))?;
+    fs::write(&flashed, flash::flash(&program, &slots)?).context("cannot write the flashed binary")?;
     let socket = folder.path().join("serial");
     let serial = match link {
         LinkKind::Lockstep => {
@@ -92,11 +132,11 @@ pub fn connect(elf: &Path, model: Option<&[u8]>, link: LinkKind, shift: u32) -> 
         }
         LinkKind::Uart => format!("unix:{},server=on,wait=on", socket.display()),
     };
-    let mut command = emulator::command(&format!("shift={shift},sleep=off"), &serial)?;
+    let mut command = emulator::command(further, &format!("shift={shift},sleep=off"), &serial)?;
     let stderr = fs::File::create(folder.path().join("stderr")).context("cannot write")?;
-    command.arg(elf).current_dir(folder.path()).stdin(Stdio::null()).stdout(Stdio::null()).stderr(stderr);
+    command.arg(&flashed).current_dir(folder.path()).stdin(Stdio::null()).stdout(Stdio::null()).stderr(stderr);
     let child = emulator::spawn(&mut command)?;
-    let mut emulated = Emulated { child, folder };
+    let mut emulated = Emulated { child, folder, elf, link, shift };
     let path = emulated.folder.path().to_owned();
     let alive = || match emulated.child.try_wait()? {
         Some(status) => Err(io::Error::other(format!("the emulator ended ({status})"))),

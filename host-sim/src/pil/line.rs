@@ -55,6 +55,8 @@ impl Line for Box<dyn Line> {
 /// If the folder cannot hold them.
 pub(super) fn make_fifos(folder: &Path) -> io::Result<()> {
     for name in [TO_FIRMWARE, FROM_FIRMWARE] {
+        // Those of an emulator that ended may hold bytes.
+        let _ = std::fs::remove_file(folder.join(name));
         mknodat(CWD, folder.join(name), FileType::Fifo, Mode::RUSR | Mode::WUSR, 0)?;
     }
     Ok(())

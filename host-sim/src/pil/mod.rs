@@ -6,11 +6,13 @@
 mod board;
 mod emulator;
 mod faults;
+mod flash;
 mod flights;
 mod line;
+mod upload;
 
 pub use board::{Board, Figures};
-pub use emulator::{Emulated, LinkKind, connect, firmware, start};
+pub use emulator::{Emulated, LinkKind, connect, firmware, restart, start};
 pub use faults::{Faults, Faulty};
 pub use flights::{CYCLES_PER_INSTRUCTION, PilReport, fly};
 pub use line::{Line, Lockstep, Serial};

@@ -16,7 +16,7 @@ use super::{
     memory::Symbols,
     nets::Net,
 };
-use crate::emulator::{build_firmware, run, run_with, target_folder};
+use crate::emulator::{FIRMWARE, build_firmware, run, run_with, target_folder};
 
 /// Far more than the slowest run needs.
 const TIMEOUT: Duration = Duration::from_secs(120);
@@ -140,7 +140,7 @@ impl<'p> Board<'p> {
         remove_others(&folder, images.keys().map(String::as_str).collect())?;
         let folder = folder.canonicalize()?;
         let folder = folder.to_str().context("the target folder's name is not Unicode")?;
-        let elf = build_firmware("impromptu-mcu-benchmark", "mcu-benchmark", &[("IMPROMPTU_MCU_IMAGES", folder)])?;
+        let elf = build_firmware("impromptu-mcu-benchmark", "mcu-benchmark", FIRMWARE, &[("IMPROMPTU_MCU_IMAGES", folder)])?;
         Ok(Self { symbols: Symbols::read(&elf)?, elf, plugin, images })
     }
 

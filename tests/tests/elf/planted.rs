@@ -8,10 +8,11 @@ use impromptu_tests::{
         graph::{CallGraph, EXCEPTION_FRAME},
         proof::{Finding, Proof},
     },
-    emulator::build_firmware,
+    emulator::{FIRMWARE, build_firmware},
 };
 
-static IMAGE: LazyLock<Elf> = LazyLock::new(|| Elf::read(&build_firmware("impromptu-planted", "planted", &[]).unwrap()).unwrap());
+static IMAGE: LazyLock<Elf> =
+    LazyLock::new(|| Elf::read(&build_firmware("impromptu-planted", "planted", FIRMWARE, &[]).unwrap()).unwrap());
 
 /// Whether something was found, by the name of what was looked for.
 fn found(proof: &Proof<'_>) -> Vec<&'static str> {

@@ -1,13 +1,11 @@
 //! What the emulated board can measure of itself: executed instructions, delay of a tick, depth of the stack.
 
-use core::hint::black_box;
-
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
 use cortex_m_stack::{repaint_stack, stack_painted, stack_size};
+use impromptu_board::{CONTROL_HZ, CORE_HZ, Cost};
 
-/// Clock of SysTick, Hz, and its ticks from one control tick to the next.
-const CORE_HZ: u32 = 168_000_000;
-const RELOAD: u32 = CORE_HZ / 500 - 1;
+/// Ticks of SysTick from one control tick to the next.
+const RELOAD: u32 = CORE_HZ / CONTROL_HZ - 1;
 
 /// A 32-bit timer of the microcontroller.
 pub(crate) trait Timer {
@@ -49,33 +47,21 @@ impl<T: Timer> Counter<T> {
         counter
     }
 
-    /// The timer's reading.
-    pub(crate) fn now(&self) -> u32 {
-        self.timer.count()
-    }
-
-    /// Instructions since a reading.
-    pub(crate) fn since(&self, start: u32) -> u32 {
-        self.now().wrapping_sub(start) / self.nanoseconds
-    }
-
-    /// Result of `stage` and how many instructions it took.
-    ///
-    /// Without the black boxes the compiler may move arithmetic out of the stage, across the readings.
-    #[inline(always)]
-    pub(crate) fn measure<R>(&self, stage: impl FnOnce() -> R) -> (R, u32) {
-        let start = self.now();
-        let result = black_box(stage)();
-        // By reference: a large result shall not be copied within the stage.
-        black_box(&result);
-        (result, self.since(start))
-    }
-
     /// Instructions since the present control tick was due.
     pub(crate) fn since_tick(&self) -> u32 {
         // At most 336,000 ticks: no overflow in 64 bits, and the quotient is small.
         let nanoseconds = u64::from(RELOAD - SYST::get_current()) * 1_000 / u64::from(CORE_HZ / 1_000_000);
         nanoseconds as u32 / self.nanoseconds
+    }
+}
+
+impl<T: Timer> Cost for Counter<T> {
+    fn now(&self) -> u32 {
+        self.timer.count()
+    }
+
+    fn since(&self, start: u32) -> u32 {
+        self.now().wrapping_sub(start) / self.nanoseconds
     }
 }
 

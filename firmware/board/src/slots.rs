@@ -1,0 +1,21 @@
+//! Where models lie in flash: the last two sectors, which memory.x keeps free of the program.
+//!
+//! *in* nothing; *out* the bytes of both slots; *never* what the compiler thinks that they are; *source* RM0090, table 5: sectors 10 and 11.
+
+use core::hint::black_box;
+
+/// Bytes of a slot: a sector of the flash, which is erased as a whole.
+pub const SLOT: usize = 128 * 1024;
+
+/// Both slots. A model behind its header lies on a boundary of 16 bytes.
+#[repr(C, align(16))]
+struct Slots([[u8; SLOT]; 2]);
+
+/// Named so that memory.x places it over the sectors. It is not loaded: the zeros are the compiler's alone, who does not know of uploads.
+static IMPROMPTU_SLOTS: Slots = Slots([[0; SLOT]; 2]);
+
+/// What the flash holds.
+pub fn slots() -> [&'static [u8]; 2] {
+    let Slots([first, second]) = black_box(&IMPROMPTU_SLOTS);
+    [first, second]
+}

@@ -1,0 +1,54 @@
+//! What a board starts with: the newest model of its slots that it can fly, and the loop of a Crazyflie until it is sent another.
+
+use impromptu_firmware::{
+    application::Application,
+    flight::Flight,
+    model::{Model, Refusal},
+    network::Network,
+    storage::{Place, Sequence, Survey, survey},
+};
+use static_cell::ConstStaticCell;
+
+use crate::CRAZYFLIE;
+
+/// A board that is ready.
+pub struct Start {
+    /// For the control task.
+    pub application: &'static mut Application<'static>,
+    /// For the inference task.
+    pub network: Option<&'static Network<'static>>,
+    /// The slot for the next upload.
+    pub spare: Place,
+    /// Its number.
+    pub sequence: Sequence,
+}
+
+/// Looks at the slots and sets the application up; once, since it lies in a static. `None`: the airframe cannot be mixed.
+#[inline(never)]
+pub fn start(slots: [&'static [u8]; 2]) -> Option<Start> {
+    static APPLICATION: ConstStaticCell<Application<'static>> = ConstStaticCell::new(Application::new());
+    let application = APPLICATION.take();
+    let autopilot = application.autopilot();
+    autopilot.configure(&CRAZYFLIE).ok()?;
+    let Survey { flies, spare, sequence } = survey(slots, fits);
+    let model = flies.and_then(|stored| model(stored.file()));
+    if let Some(model) = model {
+        // It was checked to fit.
+        let _ = autopilot.load(model, Some(u8::from(spare == Place::First)));
+    }
+    Some(Start { application, network: model.and_then(Model::network), spare, sequence })
+}
+
+/// Whether a model is for this vehicle.
+///
+/// # Errors
+/// If its signals, rate or preview are others.
+pub fn fits(model: &Model<'_>) -> Result<(), Refusal> {
+    Flight::accepts(model, &CRAZYFLIE.rates)
+}
+
+#[inline(never)]
+fn model(file: &'static [u8]) -> Option<&'static Model<'static>> {
+    static MODEL: ConstStaticCell<Model<'static>> = ConstStaticCell::new(Model::VACANT);
+    Model::load_into(MODEL.take(), file).ok()
+}

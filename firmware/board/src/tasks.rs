@@ -1,0 +1,160 @@
+//! What the tasks of a board do; which interrupt runs them is the board's affair.
+//!
+//! *in* bytes, control ticks, jobs, pieces of models; *out* motor commands, and which task of lower priority has something to do; *never* a
+//! wait for a task of lower priority: everything between them goes through mailboxes; *source* ours.
+
+use core::{
+    hint::black_box,
+    sync::atomic::{AtomicU32, Ordering},
+};
+
+use impromptu_firmware::{
+    adapter::{Inference, Job},
+    application::{Application, Upload, WORDS, outcome_from_words, outcome_words},
+    autopilot::Meters,
+    exchange::Mailbox,
+    model::{MAX_FEATURES, MAX_OUTPUTS},
+    network::{Network, Scratch},
+    storage::{Slot, Uploader},
+    types::MotorCommand,
+};
+
+use crate::start::fits;
+
+/// Measures what a task costs, in instructions or cycles.
+pub trait Cost {
+    /// The reading now.
+    fn now(&self) -> u32;
+
+    /// What was spent since a reading.
+    fn since(&self, start: u32) -> u32;
+
+    /// Result of `stage` and what it cost.
+    ///
+    /// Without the black boxes the compiler may move arithmetic out of the stage, across the readings.
+    #[inline(always)]
+    fn measure<R>(&self, stage: impl FnOnce() -> R) -> (R, u32) {
+        let start = self.now();
+        let result = black_box(stage)();
+        // By reference: a large result shall not be copied within the stage.
+        black_box(&result);
+        (result, self.since(start))
+    }
+}
+
+/// The hand-over between the tasks, in a static. Each method belongs to one task.
+#[derive(Debug)]
+pub struct Tasks {
+    jobs: Mailbox<MAX_FEATURES>,
+    inferences: Mailbox<MAX_OUTPUTS>,
+    uploads: Mailbox<WORDS>,
+    outcomes: Mailbox<2>,
+    /// Cost of the control task so far, which interrupts the inference; the largest inference without it.
+    control_total: AtomicU32,
+    inference_max: AtomicU32,
+    /// Bytes of the stack that were ever used.
+    stack: AtomicU32,
+}
+
+/// What a tick of the control task leaves to do.
+#[derive(Clone, Copy, Debug)]
+pub struct Tick {
+    /// What the motors get.
+    pub command: MotorCommand,
+    /// The inference has a job.
+    pub job: bool,
+    /// Cost of the tick.
+    pub cost: u32,
+}
+
+impl Tasks {
+    /// Nothing to do.
+    pub const fn new() -> Self {
+        Self {
+            jobs: Mailbox::new(),
+            inferences: Mailbox::new(),
+            uploads: Mailbox::new(),
+            outcomes: Mailbox::new(),
+            control_total: AtomicU32::new(0),
+            inference_max: AtomicU32::new(0),
+            stack: AtomicU32::new(0),
+        }
+    }
+
+    /// Control: hears bytes of the link; whether the storage has a piece to store.
+    #[inline]
+    pub fn hear(&self, application: &mut Application<'_>, bytes: &[u8]) -> bool {
+        let mut piece = false;
+        for byte in bytes {
+            if let Some(upload) = application.hear(*byte) {
+                self.uploads.put(0, upload.words());
+                piece = true;
+            }
+        }
+        piece
+    }
+
+    /// Control: flies a tick; `heard` is what hearing for it cost.
+    #[inline]
+    pub fn fly(&self, application: &mut Application<'_>, meters: &mut Meters, counter: &impl Cost, heard: u32) -> Tick {
+        // With the first tick of a flight comes its trajectory.
+        let flying = application.autopilot().in_flight();
+        let ((command, job), flown) = counter.measure(|| {
+            if let Some((tick, outputs)) = self.inferences.take_floats() {
+                application.deliver(Inference { tick: tick as i32, outputs });
+            }
+            if let Some((sequence, words)) = self.outcomes.take()
+                && let Some(outcome) = outcome_from_words(words)
+            {
+                application.acknowledge(sequence as u8, outcome);
+            }
+            let (command, job) = application.step(meters);
+            if let Some(Job { tick, inputs }) = &job {
+                self.jobs.put_floats(*tick as u32, inputs);
+            }
+            (command, job.is_some())
+        });
+        let cost = heard.saturating_add(flown);
+        if flying {
+            meters.control_max = meters.control_max.max(cost);
+        }
+        meters.inference_max = self.inference_max.load(Ordering::Relaxed);
+        meters.stack_bytes = self.stack.load(Ordering::Relaxed);
+        self.control_total.fetch_add(cost, Ordering::Relaxed);
+        Tick { command, job, cost }
+    }
+
+    /// Inference: does the job that waits.
+    #[inline]
+    pub fn infer(&self, network: Option<&Network<'_>>, scratch: &mut Scratch, counter: &impl Cost) {
+        let Some(network) = network else { return };
+        let Some((tick, inputs)) = self.jobs.take_floats() else { return };
+        let interrupted = self.control_total.load(Ordering::Relaxed);
+        let ((), cost) = counter.measure(|| {
+            let Inference { tick, outputs } = Job { tick: tick as i32, inputs }.run(network, scratch);
+            self.inferences.put_floats(tick as u32, &outputs);
+        });
+        let interrupted = self.control_total.load(Ordering::Relaxed).wrapping_sub(interrupted);
+        self.inference_max.fetch_max(cost.saturating_sub(interrupted), Ordering::Relaxed);
+    }
+
+    /// Storage: stores the piece that waits.
+    #[inline]
+    pub fn store<S: Slot>(&self, uploader: &mut Uploader<S>) {
+        let Some((_, words)) = self.uploads.take() else { return };
+        let upload = Upload::from_words(words);
+        let outcome = upload.carry_out(uploader, fits);
+        self.outcomes.put(upload.sequence.into(), &outcome_words(&outcome));
+    }
+
+    /// Idle: the high-water mark of the stack.
+    pub fn report_stack(&self, bytes: u32) {
+        self.stack.store(bytes, Ordering::Relaxed);
+    }
+}
+
+impl Default for Tasks {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,80 @@
+//! A card, field by field, where it shall stay.
+//!
+//! *in* the postcard bytes of a [`Card`]; *out* the card, and the bytes behind it; *never* another card than `postcard` makes of these bytes;
+//! *source* the fields of [`Card`] in their order.
+//!
+//! Serde returns what it decodes, and each level of it has a copy on the stack: 16 KB for a card of 3.
+
+use heapless::Vec;
+use serde::Deserialize;
+
+use super::Card;
+
+/// Decodes into `card`; `None` if the bytes are no card, or one that is too large.
+pub(super) fn card<'a>(mut bytes: &'a [u8], card: &mut Card<'a>) -> Option<&'a [u8]> {
+    let rest = &mut bytes;
+    let Card { name, provenance, signals, timing, features, outputs, network, lane, monitor, envelope, bounds, probes } = card;
+    take(rest, name)?;
+    take(rest, provenance)?;
+    list(rest, &mut signals.desired)?;
+    list(rest, &mut signals.measured)?;
+    list(rest, &mut signals.reference)?;
+    take(rest, timing)?;
+    list(rest, features)?;
+    list(rest, outputs)?;
+    take(rest, network)?;
+    take(rest, lane)?;
+    take(rest, monitor)?;
+    take(rest, envelope)?;
+    take(rest, bounds)?;
+    take(rest, probes)?;
+    Some(bytes)
+}
+
+#[inline(never)]
+fn take<'a, T: Deserialize<'a>>(bytes: &mut &'a [u8], place: &mut T) -> Option<()> {
+    let (value, rest) = postcard::take_from_bytes(bytes).ok()?;
+    (*place, *bytes) = (value, rest);
+    Some(())
+}
+
+fn list<'a, T: Deserialize<'a>, const N: usize>(bytes: &mut &'a [u8], items: &mut Vec<T, N>) -> Option<()> {
+    items.clear();
+    let mut count = 0_usize;
+    take(bytes, &mut count)?;
+    for _ in 0..count {
+        let (item, rest) = postcard::take_from_bytes(bytes).ok()?;
+        items.push(item).ok()?;
+        *bytes = rest;
+    }
+    Some(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::file;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn damaged_and_whole_cards_are_what_postcard_says(which in 0usize..2, changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..3), keep in any::<prop::sample::Index>(), cut in any::<bool>()) {
+            let models: [&[u8]; 2] = [include_bytes!("../../../tests/golden/models/int8-lane.model"), include_bytes!("../../../tests/golden/models/float-skip.model")];
+            let mut bytes = file::split(models[which]).unwrap().0.to_vec();
+            for (index, byte) in changes {
+                let at = index.index(bytes.len());
+                bytes[at] = byte;
+            }
+            if cut {
+                bytes.truncate(keep.index(bytes.len()));
+            }
+            let mut found = Card::EMPTY;
+            let rest = card(&bytes, &mut found);
+            match postcard::take_from_bytes::<Card<'_>>(&bytes) {
+                // By text: a number that is none is not equal to itself.
+                Ok((expected, behind)) => prop_assert_eq!((format!("{found:?}"), rest), (format!("{expected:?}"), Some(behind))),
+                Err(_) => prop_assert_eq!(rest, None),
+            }
+        }
+    }
+}
