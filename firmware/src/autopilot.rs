@@ -13,6 +13,8 @@
 
 mod news;
 
+use nalgebra::{Quaternion, UnitQuaternion, Vector4};
+
 use crate::{
     adapter::{Inference, Job, Lanes},
     flight::{Flight, PREVIEW, Settings},
@@ -28,9 +30,6 @@ use crate::{
 
 use news::News;
 pub use news::Patience;
-
-/// The model that flies and the slot that it is in (`None`: a part of the firmware).
-pub type Flown<'m> = (&'m Model<'m>, Option<u8>);
 
 /// What a board measures of itself; the unit of costs is the board's (instructions or cycles).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -63,7 +62,8 @@ pub enum Reaction {
 pub struct Autopilot<'m> {
     flight: Flight<'m>,
     settings: Option<Settings>,
-    model: Option<Flown<'m>>,
+    model: Option<&'m Model<'m>>,
+    slot: Option<u8>,
     lanes: Lanes,
     state: State,
     news: News,
@@ -89,8 +89,12 @@ impl<'m> Autopilot<'m> {
             flight: Flight::parked(),
             settings: None,
             model: None,
+            slot: None,
             lanes: Lanes::NONE,
-            state: State::ORIGIN,
+            state: State {
+                attitude: UnitQuaternion::new_unchecked(Quaternion::from_vector(Vector4::new(0.0, 0.0, 0.0, 0.0))),
+                ..State::ORIGIN
+            },
             news: News::NONE,
             tick: Tick(0),
             armed: false,
@@ -108,7 +112,7 @@ impl<'m> Autopilot<'m> {
         if let Some(settings) = &self.settings {
             self.flight.attach(model, settings, Lanes::NONE)?;
         }
-        self.model = Some((model, slot));
+        (self.model, self.slot) = (Some(model), slot);
         Ok(())
     }
 
@@ -123,8 +127,8 @@ impl<'m> Autopilot<'m> {
         if !self.flight.configure(settings) {
             return Err(Reason::Settings);
         }
-        (self.settings, self.news) = (Some(*settings), News::new(settings));
-        if let Some((model, _)) = self.model {
+        (self.settings, self.news, self.state) = (Some(*settings), News::new(settings), State::ORIGIN);
+        if let Some(model) = self.model {
             self.flight.attach(model, settings, Lanes::NONE).map_err(|refusal| Reason::Model((&refusal).into()))?;
         }
         Ok(())
@@ -221,7 +225,8 @@ impl<'m> Autopilot<'m> {
 
     /// Who this is.
     pub fn identity<'a>(&'a self, software: &'a str) -> Identity<'a> {
-        let model = self.model.map(|(model, slot)| crate::link::message::FlyingModel {
+        let slot = self.slot;
+        let model = self.model.map(|model| crate::link::message::FlyingModel {
             name: model.card().name,
             checksum: model.checksum(),
             slot,
@@ -262,9 +267,8 @@ impl<'m> Autopilot<'m> {
     }
 
     fn switch(&mut self, lanes: Lanes) -> Result<(), Reason> {
-        let model = self.model.map(|(model, _)| model);
-        let missing = (lanes.network && model.and_then(Model::network).is_none())
-            || (lanes.feedback && model.and_then(Model::lane).is_none());
+        let missing = (lanes.network && self.model.and_then(Model::network).is_none())
+            || (lanes.feedback && self.model.and_then(Model::lane).is_none());
         if missing {
             return Err(Reason::NoModel);
         }
@@ -286,6 +290,7 @@ impl<'m> Autopilot<'m> {
             return Err(Reason::Setpoint { expected: 0 });
         }
         (self.armed, self.tick, self.error_square) = (true, Tick(0), 0.0);
+        self.news.seen();
         Ok(())
     }
 

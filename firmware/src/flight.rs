@@ -5,7 +5,7 @@
 
 use core::num::NonZeroU32;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -13,7 +13,7 @@ use crate::{
     control::{Airframe, AttitudeGains, AttitudeLoop, Mixer, PositionGains, PositionLoop, ThrustVector},
     model::{Model, Refusal},
     network::Scratch,
-    preview::Preview,
+    preview::{EndRule, Preview},
     quadrotor::{self, DESIRED, MEASURED, REFERENCE},
     types::{MotorCommand, Reference, Setpoint, State, Tick},
 };
@@ -86,12 +86,37 @@ impl Loops {
     }
 }
 
+/// An option that is all zeros while it is empty, so that a static with it takes no flash: the compiler would mark an empty `Option`
+/// with a byte of its own choice.
+#[derive(Debug)]
+#[repr(u8)]
+enum AddOn<T> {
+    Absent = 0,
+    Present(T) = 1,
+}
+
+impl<T> AddOn<T> {
+    fn as_ref(&self) -> Option<&T> {
+        match self {
+            Self::Absent => None,
+            Self::Present(addon) => Some(addon),
+        }
+    }
+
+    fn as_mut(&mut self) -> Option<&mut T> {
+        match self {
+            Self::Absent => None,
+            Self::Present(addon) => Some(addon),
+        }
+    }
+}
+
 /// The baseline loop with, if a model is given, the add-on before it.
 #[derive(Debug)]
 pub struct Flight<'m> {
     loops: Option<Loops>,
     preview: Preview<DESIRED, PREVIEW>,
-    adapter: Option<QuadrotorAdapter<'m>>,
+    adapter: AddOn<QuadrotorAdapter<'m>>,
     wanted: ThrustVector,
     reference: Reference,
     excitation: Vector3<f32>,
@@ -104,9 +129,12 @@ impl<'m> Flight<'m> {
     pub const fn parked() -> Self {
         Self {
             loops: None,
-            preview: Preview::new(quadrotor::END_RULES, 0),
-            adapter: None,
-            wanted: ThrustVector::NONE,
+            preview: Preview::new([EndRule::Hold; DESIRED], 0),
+            adapter: AddOn::Absent,
+            wanted: ThrustVector {
+                force: Vector3::new(0.0, 0.0, 0.0),
+                attitude: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+            },
             reference: Reference::ORIGIN,
             excitation: Vector3::new(0.0, 0.0, 0.0),
             command_delay: 0,
@@ -124,7 +152,7 @@ impl<'m> Flight<'m> {
     pub fn configure(&mut self, settings: &Settings) -> bool {
         let Some(loops) = Loops::new(settings) else { return false };
         self.loops = Some(loops);
-        self.adapter = None;
+        self.adapter = AddOn::Absent;
         self.land();
         true
     }
@@ -137,8 +165,8 @@ impl<'m> Flight<'m> {
         {
             *loops = fresh;
         }
-        self.preview.clear(0);
-        if let Some(adapter) = &mut self.adapter {
+        self.preview.restart(quadrotor::END_RULES, 0);
+        if let Some(adapter) = self.adapter.as_mut() {
             adapter.reset();
         }
         (self.wanted, self.reference, self.excitation) = (ThrustVector::NONE, Reference::ORIGIN, Vector3::zeros());
@@ -151,9 +179,11 @@ impl<'m> Flight<'m> {
     /// If the model is for other signals, another rate, or a longer preview.
     pub fn attach(&mut self, model: &'m Model<'m>, settings: &Settings, lanes: Lanes) -> Result<(), Refusal> {
         Self::accepts(model, &settings.rates)?;
-        let adapter = self.adapter.insert(Adapter::tied(model, base_channels()));
-        adapter.defer();
-        adapter.switch(lanes);
+        self.adapter = AddOn::Present(Adapter::tied(model, base_channels()));
+        if let Some(adapter) = self.adapter.as_mut() {
+            adapter.defer();
+            adapter.switch(lanes);
+        }
         Ok(())
     }
 
@@ -233,7 +263,7 @@ impl<'m> Flight<'m> {
         let Some(loops) = &mut self.loops else { return (MotorCommand::OFF, job) };
         if tick.0.is_multiple_of(loops.position_divisor.get()) {
             let reference_tick = (tick.0 / loops.position_divisor) as i32;
-            (self.reference, job) = adapted(&self.preview, &mut self.adapter, reference_tick, state);
+            (self.reference, job) = adapted(&self.preview, self.adapter.as_mut(), reference_tick, state);
             if self.excitation != Vector3::zeros() {
                 self.reference.position += self.excitation;
             }
@@ -254,7 +284,7 @@ impl<'m> Flight<'m> {
 
     /// Takes what came of a job of [`Flight::control`].
     pub fn deliver(&mut self, inference: Inference) {
-        if let Some(adapter) = &mut self.adapter {
+        if let Some(adapter) = self.adapter.as_mut() {
             adapter.deliver(inference);
         }
     }
@@ -269,7 +299,7 @@ fn base_channels() -> [usize; REFERENCE] {
 /// The reference at a reference tick, and the network's job if there is one.
 fn adapted(
     preview: &Preview<DESIRED, PREVIEW>,
-    adapter: &mut Option<QuadrotorAdapter<'_>>,
+    adapter: Option<&mut QuadrotorAdapter<'_>>,
     tick: i32,
     state: &State,
 ) -> (Reference, Option<Job>) {

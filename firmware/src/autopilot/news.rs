@@ -61,9 +61,9 @@ pub(super) struct News {
 }
 
 impl News {
-    /// Nothing was ever heard, and no patience.
+    /// Before there are settings: all zeros, so that a static with it takes no flash.
     pub(super) const NONE: Self = {
-        let source = Source { stamp: None, age: u32::MAX, lanes: 0, motors: 0 };
+        let source = Source { stamp: None, age: 0, lanes: 0, motors: 0 };
         Self { inertial: source, position: source }
     };
 
@@ -89,6 +89,11 @@ impl News {
     /// Whether a new attitude came since the last control tick.
     pub(super) fn informed(&self) -> bool {
         self.inertial.age == 0
+    }
+
+    /// What was heard so far is not news any more: the next tick waits for an attitude of its own.
+    pub(super) fn seen(&mut self) {
+        self.inertial.age = self.inertial.age.max(1);
     }
 
     /// A control tick passes.

@@ -260,10 +260,7 @@ impl<L: Line> FlightStack for BoardFlight<'_, L> {
         self.board.tell("a setpoint", &Command::Setpoint(TimedSetpoint::new(self.next, setpoint)));
         self.next += 1;
         if self.board.outgoing.len() > QUEUE {
-            // The answer says that the queue is empty again.
-            self.board.model = None;
-            self.board.tell("who it is", &Command::Hello);
-            self.board.talk(|board| board.model.is_some());
+            self.flush();
         }
     }
 
@@ -276,6 +273,10 @@ impl<L: Line> FlightStack for BoardFlight<'_, L> {
     }
 
     fn step(&mut self, tick: Tick, state: &State) -> MotorCommand {
+        if tick.0 == 0 {
+            // The rest of the upload shall not be heard within the first tick.
+            self.flush();
+        }
         let board = &mut *self.board;
         if tick.0.is_multiple_of(self.divisor) {
             board.tell("the position", &Command::Position(Position::new(tick, state)));
@@ -311,6 +312,13 @@ impl<L: Line> FlightStack for BoardFlight<'_, L> {
 }
 
 impl<L: Line> BoardFlight<'_, L> {
+    /// Sends what was told, and waits for an answer: it says that the firmware's queue is empty again.
+    fn flush(&mut self) {
+        self.board.model = None;
+        self.board.tell("who it is", &Command::Hello);
+        self.board.talk(|board| board.model.is_some());
+    }
+
     /// What went wrong in the flight.
     ///
     /// # Errors

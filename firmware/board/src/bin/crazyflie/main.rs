@@ -122,7 +122,10 @@ mod app {
     #[task(binds = SysTick, priority = 3, local = [application, motors, meters, watchdog, restart, piece])]
     fn control(cx: control::Context) {
         let control::LocalResources { application, motors, meters, watchdog, restart, piece, .. } = cx.local;
-        meters.entry_latency_max = meters.entry_latency_max.max(instruments::since_tick());
+        let entry = instruments::since_tick();
+        if application.autopilot().in_flight() {
+            meters.entry_latency_max = meters.entry_latency_max.max(entry);
+        }
         // The watchdog has taken up its patience of a disarmed vehicle since the piece came.
         if core::mem::take(piece) {
             rtic::pend(Interrupt::CRYP);
@@ -145,7 +148,7 @@ mod app {
         }
         rtic::pend(Interrupt::USART3);
         // The next tick is due, and this one is not done.
-        meters.deadline_misses += u32::from(SCB::is_pendst_pending());
+        meters.deadline_misses += u32::from(application.autopilot().in_flight() && SCB::is_pendst_pending());
         restart.tick(application.restart_due());
         watchdog.feed(application.autopilot().armed());
     }
