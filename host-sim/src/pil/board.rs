@@ -22,6 +22,8 @@ use crate::rollout::FlightStack;
 const PATIENCE: Duration = Duration::from_millis(500);
 /// Bytes that the firmware's queue of a serial line takes at once.
 const QUEUE: usize = 1024;
+/// Ticks in which the firmware catches up after an upload.
+const CATCH_UP: usize = 5;
 
 /// A piece of a model among the commands.
 const PIECE: &str = "a piece of the model";
@@ -317,6 +319,12 @@ impl<L: Line> BoardFlight<'_, L> {
         self.board.model = None;
         self.board.tell("who it is", &Command::Hello);
         self.board.talk(|board| board.model.is_some());
+        if self.board.lockstep {
+            // To hear a thousand bytes takes longer than a tick: the ticks that are behind catch up.
+            for _ in 0..CATCH_UP {
+                self.board.talk(|_| true);
+            }
+        }
     }
 
     /// What went wrong in the flight.
