@@ -78,7 +78,7 @@ cargo clippy --workspace --all-targets --locked -- -D warnings
 
 say "clippy, microcontroller"
 (cross clippy --package impromptu-firmware --package impromptu-c-abi --package impromptu-mcu-benchmark --package impromptu-planted --lib --bins --locked --target $target --profile firmware --target-dir target/firmware -- -D warnings)
-(cross clippy --package impromptu-board --bins --locked --target $target --profile firmware --target-dir target/firmware -- -D warnings)
+(cross clippy --package impromptu-board --lib --bins --locked --target $target --profile board --target-dir target/firmware -- -D warnings)
 
 say "documentation"
 RUSTDOCFLAGS=-Dwarnings cargo doc --workspace --no-deps --locked

@@ -1,11 +1,11 @@
 //! The vehicle on its link: what it is told, what it does, and what it does when it is told nothing.
 //!
 //! *in* the link's commands and control ticks; *out* a motor command at every tick; *never* motors that turn while disarmed, or for longer
-//! than [`Patience::motors_s`] without news of attitude and position; *source* ours.
+//! than [`Patience::motors_inertial_s`] without news of attitude and position; *source* ours.
 //!
 //! | what arrives | what happens |
 //! |---|---|
-//! | nothing for a while | the newest state is held; after [`Patience::lanes_s`] the add-on fades out, after [`Patience::motors_s`] motors off, disarmed |
+//! | nothing for a while | the newest state is held; after [`Patience::lanes_inertial_s`] the add-on fades out, after [`Patience::motors_inertial_s`] motors off, disarmed |
 //! | a state that is older than the newest | ignored |
 //! | a setpoint after a gap | the gap is filled in a straight line; one longer than the preview is not: the trajectory begins anew |
 //! | a setpoint that is stored already | ignored |

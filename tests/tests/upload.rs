@@ -98,6 +98,5 @@ fn what_is_no_model_for_this_vehicle_is_refused_and_the_old_one_flies_on() {
     }
     flight.step(Tick(0), &State::default());
     flight.check().unwrap();
-    drop(flight);
     assert_eq!(reason(board.upload(&old)), Reason::Armed);
 }
