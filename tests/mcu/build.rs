@@ -42,6 +42,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rustc-link-search={out}");
     println!("cargo::rustc-link-arg-bins=-Tlink.x");
     println!("cargo::rustc-link-arg-bins=--nmagic");
+    // Its images need the flash of the uploaded models.
+    println!("cargo::rustc-link-arg-bins=--defsym=_impromptu_no_models=1");
     // A fault ends the emulator, see firmware/build.rs.
     println!("cargo::rustc-link-arg-bins=--defsym=HardFault=0");
     Ok(())

@@ -33,32 +33,32 @@
 
 #if defined(IMPROMPTU_POINTER_64)
 // Words of 8 bytes of an impromptu_model.
-#define IMPROMPTU_MODEL_WORDS 640
+#define IMPROMPTU_MODEL_WORDS 704
 #endif
 
 #if defined(IMPROMPTU_POINTER_32)
 // Words of 8 bytes of an impromptu_model.
-#define IMPROMPTU_MODEL_WORDS 448
+#define IMPROMPTU_MODEL_WORDS 512
 #endif
 
 #if defined(IMPROMPTU_POINTER_64)
 // Words of 8 bytes of an impromptu_adapter.
-#define IMPROMPTU_ADAPTER_WORDS 2096
+#define IMPROMPTU_ADAPTER_WORDS 2720
 #endif
 
 #if defined(IMPROMPTU_POINTER_32)
 // Words of 8 bytes of an impromptu_adapter.
-#define IMPROMPTU_ADAPTER_WORDS 2080
+#define IMPROMPTU_ADAPTER_WORDS 2688
 #endif
 
 #if defined(IMPROMPTU_POINTER_64)
 // Words of 8 bytes of an impromptu_flight.
-#define IMPROMPTU_FLIGHT_WORDS 1568
+#define IMPROMPTU_FLIGHT_WORDS 2208
 #endif
 
 #if defined(IMPROMPTU_POINTER_32)
 // Words of 8 bytes of an impromptu_flight.
-#define IMPROMPTU_FLIGHT_WORDS 1568
+#define IMPROMPTU_FLIGHT_WORDS 2208
 #endif
 
 // Words of 8 bytes of an impromptu_scratch.

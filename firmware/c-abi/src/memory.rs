@@ -9,22 +9,22 @@ use crate::{adapter::Stage, flight::Stack};
 
 /// Words of 8 bytes of an impromptu_model.
 #[cfg(target_pointer_width = "64")]
-pub const MODEL_WORDS: usize = 640;
+pub const MODEL_WORDS: usize = 704;
 /// Words of 8 bytes of an impromptu_model.
 #[cfg(target_pointer_width = "32")]
-pub const MODEL_WORDS: usize = 448;
+pub const MODEL_WORDS: usize = 512;
 /// Words of 8 bytes of an impromptu_adapter.
 #[cfg(target_pointer_width = "64")]
-pub const ADAPTER_WORDS: usize = 2096;
+pub const ADAPTER_WORDS: usize = 2720;
 /// Words of 8 bytes of an impromptu_adapter.
 #[cfg(target_pointer_width = "32")]
-pub const ADAPTER_WORDS: usize = 2080;
+pub const ADAPTER_WORDS: usize = 2688;
 /// Words of 8 bytes of an impromptu_flight.
 #[cfg(target_pointer_width = "64")]
-pub const FLIGHT_WORDS: usize = 1568;
+pub const FLIGHT_WORDS: usize = 2208;
 /// Words of 8 bytes of an impromptu_flight.
 #[cfg(target_pointer_width = "32")]
-pub const FLIGHT_WORDS: usize = 1568;
+pub const FLIGHT_WORDS: usize = 2208;
 /// Words of 8 bytes of an impromptu_scratch.
 pub const SCRATCH_WORDS: usize = 257;
 
