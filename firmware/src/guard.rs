@@ -135,8 +135,9 @@ impl Guard {
 
     /// Forgets everything but the settings and the counts: the vehicle has landed.
     pub(crate) fn land(&mut self) {
-        let trips = self.trips;
-        *self = Self { trips, ..Self::new(self.settings, self.rate_hz) };
+        self.rearm();
+        (self.age, self.outside) = (0, 0);
+        self.restart();
     }
 
     /// Of the lanes wanted those that may act.

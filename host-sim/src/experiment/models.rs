@@ -148,7 +148,8 @@ pub fn feedforward(settings: &Settings, description: Description) -> Result<Vec<
         output_scale: vec![1.0; REFERENCE],
         notes: Default::default(),
     };
-    let timing = Timing { divisor: 1, interpolation: Interpolation::Hold, ..description.timing };
+    // Evaluated a tick ahead, so that the inference's time does not delay it.
+    let timing = Timing { divisor: 1, interpolation: Interpolation::Linear, ..description.timing };
     let description = Description { timing, envelope: vec![(-20.0, 20.0); 3], features, ..description };
     encode(&description, Some(&network), Precision::Float, &[vec![1.0, -2.0, 0.5]])
 }
