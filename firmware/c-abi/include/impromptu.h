@@ -43,22 +43,22 @@
 
 #if defined(IMPROMPTU_POINTER_64)
 // Words of 8 bytes of an impromptu_adapter.
-#define IMPROMPTU_ADAPTER_WORDS 2720
+#define IMPROMPTU_ADAPTER_WORDS 2560
 #endif
 
 #if defined(IMPROMPTU_POINTER_32)
 // Words of 8 bytes of an impromptu_adapter.
-#define IMPROMPTU_ADAPTER_WORDS 2688
+#define IMPROMPTU_ADAPTER_WORDS 2528
 #endif
 
 #if defined(IMPROMPTU_POINTER_64)
 // Words of 8 bytes of an impromptu_flight.
-#define IMPROMPTU_FLIGHT_WORDS 2208
+#define IMPROMPTU_FLIGHT_WORDS 2112
 #endif
 
 #if defined(IMPROMPTU_POINTER_32)
 // Words of 8 bytes of an impromptu_flight.
-#define IMPROMPTU_FLIGHT_WORDS 2208
+#define IMPROMPTU_FLIGHT_WORDS 2112
 #endif
 
 // Words of 8 bytes of an impromptu_scratch.

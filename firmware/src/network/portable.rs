@@ -53,7 +53,11 @@ pub fn integer(width: Width, stream: &[[u8; 4]], inputs: &[u32], finish: Finish,
                 }
             }
         }
-        let code = |row: usize| requantise(sums[row], i32::from_le_bytes(multipliers[row]));
+        let code = |row: usize| match (sums.get(row), multipliers.get(row)) {
+            (Some(sum), Some(multiplier)) => requantise(*sum, i32::from_le_bytes(*multiplier)),
+            // There are as many as rows: not an index that could panic.
+            _ => 0,
+        };
         match finish {
             Finish::Codes { limit } => {
                 let code = |row| code(row).clamp(0, i32::from(limit)) as i16;

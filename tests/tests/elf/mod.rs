@@ -81,3 +81,13 @@ fn the_golden_memory_holds() {
     );
     golden::compare_for_compiler(GOLDEN, &compiler, &text).unwrap();
 }
+
+#[test]
+fn the_tasks_of_the_board_reach_no_panic_no_heap_no_recursion_and_no_f64() {
+    let image = read(&emulator::build_firmware("impromptu-board", "crazyflie", emulator::BOARD, &[]).unwrap());
+    let graph = image.call_graph().unwrap();
+    let proof = graph.from_roots(&["SysTick", "DCMI", "USART3"]).unwrap();
+    let findings = [proof.flaws(), proof.panics(), proof.allocations(), proof.indirect(), proof.double_precision()];
+    assert_eq!(findings.map(|findings| lines(&findings)), [""; 5], "flaws, panics, allocations, indirect calls, f64");
+    assert_eq!(proof.recursion(), Vec::<Vec<String>>::new());
+}
