@@ -267,7 +267,7 @@ fn calls_from_c_need_no_more_stack_than_the_header_says() {
     let used: serde_json::Map<String, serde_json::Value> = serde_json::from_str(&used).unwrap();
     let header = fs::read_to_string(c::include().join("impromptu.h")).unwrap();
     for (call, kilobytes) in
-        [("model_create", 16), ("adapter_create", 4), ("flight_create", 24), ("flight_attach", 12), ("flight_control", 4)]
+        [("model_create", 16), ("adapter_create", 12), ("flight_create", 32), ("flight_attach", 12), ("flight_control", 4)]
     {
         let prototype = header.find(&format!("impromptu_{call}(")).unwrap();
         let comment = &header[header[..prototype].rfind("\n\n").unwrap()..prototype];
@@ -276,8 +276,9 @@ fn calls_from_c_need_no_more_stack_than_the_header_says() {
     for (call, bytes) in &used {
         let limit = match call.as_str() {
             "model_create" => 16_384,
-            "adapter_create" | "flight_control" => 4_096,
-            "flight_create" => 24_576,
+            "adapter_create" => 12_288,
+            "flight_control" => 4_096,
+            "flight_create" => 32_768,
             "flight_attach" => 12_288,
             _ => 2_048,
         };

@@ -362,7 +362,7 @@ size_t impromptu_model_size(void);
 // Creates an adapter in `adapter`, which has `size` bytes, for a loop whose references run at `rate_hz`. Both lanes are off.
 //
 // `signals` is compared with the model's table, name by name; NULL takes the model's for the application's. The model must live as
-// long as the adapter. The first sample pushed will be that of reference tick `first_tick`. Needs up to 4 KB of stack.
+// long as the adapter. The first sample pushed will be that of reference tick `first_tick`. Needs up to 12 KB of stack.
 impromptu_status impromptu_adapter_create(struct impromptu_adapter *adapter,
                                           size_t size,
                                           const struct impromptu_model *model,
@@ -433,7 +433,7 @@ impromptu_status impromptu_adapter_report(struct impromptu_adapter *adapter, str
 size_t impromptu_adapter_size(void);
 
 // Creates a flight stack in `flight`, which has `size` bytes, with no add-on. The first setpoint is that of reference tick 0.
-// Needs up to 24 KB of stack.
+// Needs up to 32 KB of stack.
 impromptu_status impromptu_flight_create(struct impromptu_flight *flight,
                                          size_t size,
                                          const struct impromptu_flight_settings *settings);

@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// Creates a flight stack in `flight`, which has `size` bytes, with no add-on. The first setpoint is that of reference tick 0.
-/// Needs up to 24 KB of stack.
+/// Needs up to 32 KB of stack.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_flight_create(
     flight: *mut FlightMemory,
