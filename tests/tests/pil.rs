@@ -52,6 +52,8 @@ struct Flown {
     rms: f64,
     /// Motor fractions of every control tick.
     motors: Vec<[f32; 4]>,
+    /// Exchanges before the first control tick: the upload.
+    uploaded: u64,
     telemetry: Telemetry,
 }
 
@@ -72,8 +74,9 @@ fn with_faults(faults: Faults) -> Flown {
     assert!(!refused || !board.telemetry().armed);
     let answers = record.recorded.unwrap().answers;
     let motor = |bytes: &[u8], index: usize| f32::from_le_bytes(*bytes[4 * index..].first_chunk().unwrap());
-    let motors = answers.chunks(ANSWER).map(|answer| std::array::from_fn(|index| motor(answer, index))).collect();
-    Flown { rms: record.rms, motors, telemetry: *board.telemetry() }
+    let motors: Vec<[f32; 4]> = answers.chunks(ANSWER).map(|answer| std::array::from_fn(|index| motor(answer, index))).collect();
+    let uploaded = board.line().exchanges() - motors.len() as u64;
+    Flown { rms: record.rms, motors, uploaded, telemetry: *board.telemetry() }
 }
 
 #[test]
@@ -109,8 +112,8 @@ fn a_silent_peer_costs_the_add_on_first_and_then_the_motors() {
     assert!(short.telemetry.armed);
     // 1 s: off after 0.25 s, and off for good.
     let long = silence(500);
-    let (off, silent_from) = (on(&long), long.motors.len().min(TAKE_OFF as usize + 500));
-    assert!(off < long.motors.len() && off.abs_diff(silent_from + 125) < 30, "motors off at tick {off}");
+    let (off, silent_from) = (on(&long), (TAKE_OFF + 500 - long.uploaded) as usize);
+    assert!(off < long.motors.len() && off.abs_diff(silent_from + 125) < 5, "motors off at tick {off}");
     assert!(long.motors[off..].iter().all(|motors| *motors == [0.0; 4]));
     assert!(!long.telemetry.armed);
 }

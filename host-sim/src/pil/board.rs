@@ -18,8 +18,8 @@ use serde::Serialize;
 use super::{Line, PilError};
 use crate::rollout::FlightStack;
 
-/// How long a serial line may take to answer.
-const PATIENCE: Duration = Duration::from_millis(500);
+/// How long a serial line may take to answer: long beside a busy machine, on which the emulator waits for its turn.
+const PATIENCE: Duration = Duration::from_secs(5);
 /// Bytes that the firmware's queue of a serial line takes at once.
 const QUEUE: usize = 1024;
 /// Ticks in which the firmware catches up after an upload.
@@ -140,6 +140,11 @@ impl<L: Line> Board<L> {
     /// The last telemetry report.
     pub fn telemetry(&self) -> &Telemetry {
         &self.telemetry
+    }
+
+    /// The line to the firmware.
+    pub fn line(&self) -> &L {
+        &self.line
     }
 
     /// Ends the firmware.

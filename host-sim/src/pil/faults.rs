@@ -41,6 +41,11 @@ impl<L: Line> Faulty<L> {
         Self { line, faults, random: Xoshiro256PlusPlus::seed_from_u64(seed), exchanges: 0, held: Vec::new() }
     }
 
+    /// Exchanges so far.
+    pub fn exchanges(&self) -> u64 {
+        self.exchanges
+    }
+
     fn damaged(&mut self, bytes: &[u8]) -> Vec<u8> {
         let Faults { loss, bit_errors, cuts, late, garbage, .. } = self.faults;
         let random = &mut self.random;
