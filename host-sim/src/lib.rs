@@ -15,6 +15,7 @@ pub mod plant;
 pub mod report;
 pub mod rollout;
 pub mod sensors;
+pub mod study;
 pub mod training;
 pub mod trajectory;
 pub mod weather;

@@ -14,6 +14,7 @@ mod processor;
 mod progress;
 mod report;
 mod situation;
+mod study;
 mod train;
 mod trajectory;
 
@@ -97,6 +98,8 @@ enum Command {
     Evaluate(evaluate::Evaluate),
     /// Makes the report of stored results again.
     Report(report::Report),
+    /// Reproduces the paper row by row.
+    Study(study::Study),
     /// Writes a trajectory as CSV, or lists the known ones.
     Trajectory(trajectory::TrajectoryCommand),
 }
@@ -169,6 +172,7 @@ fn execute(arguments: Arguments, console: &Console, command: String) -> Result<(
         Some(Command::Fly(command)) => command.run(&session),
         Some(Command::Evaluate(command)) => command.run(&session),
         Some(Command::Report(command)) => command.run(&session),
+        Some(Command::Study(command)) => command.run(&session),
         Some(Command::Trajectory(command)) => command.run(&session),
     }
 }

@@ -20,6 +20,7 @@ mod table;
 pub use cases::summarise;
 pub use csv::{write_flights_csv, write_table_csv};
 pub use method::Method;
-pub use page::{render_html, write_html};
+pub use page::{render_html, render_study, write_html, write_page};
+pub use plots::{Axis, Curve, Figure, Mark};
 pub use results::{FlightTrace, LaneOutcome, Margins, ModelCard, PerFlight, Results, Row};
 pub use table::console_table;

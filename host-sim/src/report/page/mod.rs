@@ -3,8 +3,11 @@
 mod cards;
 mod charts;
 mod provenance;
+mod study;
 mod table;
 mod words;
+
+pub use study::render_study;
 
 use super::cases::{Case, Scene, flights_in_words, methods};
 use super::results::Results;
@@ -66,7 +69,14 @@ pub fn render_html(results: &Results) -> anyhow::Result<String> {
 /// # Errors
 /// When a plot cannot be drawn or the file cannot be written; the message names the file.
 pub fn write_html(results: &Results, path: &Path) -> anyhow::Result<()> {
-    let page = render_html(results)?;
+    write_page(&render_html(results)?, path)
+}
+
+/// Writes the text of a page to `path` at once, or not at all.
+///
+/// # Errors
+/// When the file cannot be written; the message names it.
+pub fn write_page(page: &str, path: &Path) -> anyhow::Result<()> {
     let name = path.file_name().with_context(|| format!("'{}' does not name a file for the report", path.display()))?;
     let mut partial = name.to_owned();
     partial.push(format!(".{}.partial", std::process::id()));

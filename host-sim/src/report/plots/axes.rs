@@ -32,9 +32,22 @@ pub(super) fn axes<'a, 'b>(
     y: Range<f64>,
     labels: &Labels<'_>,
 ) -> Result<Chart<'a, 'b>, DrawingAreaErrorKind<std::io::Error>> {
+    let decimals = (decimals(&x), decimals(&y));
+    let texts: [&dyn Fn(&f64) -> String; 2] =
+        [&|value| super::super::notation::fixed(*value, decimals.0), &|value| super::super::notation::fixed(*value, decimals.1)];
+    axes_with(area, x, y, labels, texts)
+}
+
+/// [`axes`] with the texts at the ticks of either axis.
+pub(super) fn axes_with<'a, 'b>(
+    area: &'a Area<'b>,
+    x: Range<f64>,
+    y: Range<f64>,
+    labels: &Labels<'_>,
+    texts: [&dyn Fn(&f64) -> String; 2],
+) -> Result<Chart<'a, 'b>, DrawingAreaErrorKind<std::io::Error>> {
     let (width, height) = area.dim_in_pixel();
     let ticks = |units: u32, pixels: u32| (units / UNITS_PER_PIXEL.unsigned_abs() / pixels).max(3) as usize;
-    let decimals = (decimals(&x), decimals(&y));
     let mut chart = ChartBuilder::on(area)
         .margin_top(units(TOP))
         .margin_right(units(RIGHT))
@@ -45,8 +58,8 @@ pub(super) fn axes<'a, 'b>(
         .configure_mesh()
         .x_labels(ticks(width, 60))
         .y_labels(ticks(height, 38))
-        .x_label_formatter(&|value| super::super::notation::fixed(*value, decimals.0))
-        .y_label_formatter(&|value| super::super::notation::fixed(*value, decimals.1))
+        .x_label_formatter(texts[0])
+        .y_label_formatter(texts[1])
         .light_line_style(TRANSPARENT)
         .bold_line_style(Ink::Grid.line(1.0))
         .axis_style(Ink::Grid.line(1.0))
@@ -60,7 +73,7 @@ pub(super) fn axes<'a, 'b>(
 }
 
 /// Decimals that tell neighbouring ticks apart.
-fn decimals(range: &Range<f64>) -> usize {
+pub(super) fn decimals(range: &Range<f64>) -> usize {
     let step = (range.end - range.start) / 4.0;
     (-step.log10().floor()).clamp(0.0, 4.0) as usize
 }

@@ -3,6 +3,7 @@
 mod axes;
 mod canvas;
 mod curve;
+mod curves;
 mod distribution;
 mod path;
 mod reduction;
@@ -10,6 +11,8 @@ mod rows;
 mod speed;
 mod time;
 
+pub use curves::{Axis, Curve, Figure, Mark};
+pub(super) use curves::{colour_variable, draw};
 pub(super) use distribution::error_distribution;
 pub(super) use path::path_in_space;
 pub(super) use reduction::reduction_by_method;

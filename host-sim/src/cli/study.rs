@@ -1,0 +1,46 @@
+//! `host-sim study`: the paper, row by row.
+
+use anyhow::Result;
+use clap::{Args, Subcommand};
+
+use super::{Session, output::table};
+use crate::{
+    report::{render_study, write_page},
+    study,
+};
+
+/// Arguments of `study`.
+#[derive(Debug, Args)]
+pub(super) struct Study {
+    #[command(subcommand)]
+    subject: Subject,
+}
+
+#[derive(Debug, Subcommand)]
+enum Subject {}
+
+impl Study {
+    pub(super) fn run(self, _: &Session) -> Result<()> {
+        match self.subject {}
+    }
+}
+
+/// Writes the page into the folder as `study-NAME.html` and prints what was found.
+fn show(session: &Session, name: &str, study: &study::Study) -> Result<()> {
+    let path = session.configuration.folder()?.join(format!("study-{name}.html"));
+    write_page(&render_study(study)?, &path)?;
+    session.console.note(&format!("report: {}", path.display()));
+    session.format.print(study, || {
+        let rows = study.findings.iter().map(|finding| {
+            [
+                finding.rows_text(),
+                finding.name.clone(),
+                finding.what.clone(),
+                finding.text(),
+                finding.paper_text(),
+                finding.asked_text(),
+            ]
+        });
+        table(["row", "name", "what", "found", "paper", "asked"], 3, rows)
+    })
+}
