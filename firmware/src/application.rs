@@ -20,7 +20,7 @@ use crate::{
 pub use upload::{Upload, WORDS, outcome_from_words, outcome_words};
 
 /// Bytes that can wait to be sent: what a tick says at most, and some acknowledgements.
-pub const OUTBOX: usize = 4 * FRAME;
+pub const OUTBOX: usize = 2 * FRAME;
 /// Control ticks from one telemetry report to the next.
 const TELEMETRY_TICKS: u32 = 50;
 
@@ -61,10 +61,18 @@ struct Voice {
 impl Voice {
     /// A message for which there is no room is dropped: the line is slower than the reports, and the next one tells more.
     fn say(&mut self, message: &impl Message) {
-        let mut frame = [0; FRAME];
-        if let Some((_, frame)) = self.sender.encode(message, &mut frame) {
-            let _ = self.outbox.extend_from_slice(frame);
-        }
+        let waiting = self.outbox.len();
+        // It is encoded where it waits.
+        let _ = self.outbox.resize_default(OUTBOX.min(waiting.saturating_add(FRAME)));
+        let place = self.outbox.get_mut(waiting..).unwrap_or_default();
+        let length = match self.sender.encode(message, place) {
+            Some((_, frame)) => frame.len(),
+            None => {
+                self.sender.skip();
+                0
+            }
+        };
+        self.outbox.truncate(waiting.saturating_add(length));
     }
 }
 
@@ -156,10 +164,10 @@ impl<'m> Application<'m> {
         self.autopilot.deliver(inference);
     }
 
-    /// One control tick.
-    pub fn step(&mut self, meters: &Meters) -> (MotorCommand, Option<Job>) {
+    /// One control tick; whether it leaves a job.
+    pub fn step(&mut self, meters: &Meters, job: &mut Job) -> (MotorCommand, bool) {
         let flew = self.autopilot.armed();
-        let (command, job) = self.autopilot.step();
+        let (command, released) = self.autopilot.step(job);
         if flew {
             self.voice.say(&Report::Motors(self.autopilot.motors(&command)));
         }
@@ -169,7 +177,7 @@ impl<'m> Application<'m> {
             let frames = self.frames();
             self.voice.say(&Report::Telemetry(self.autopilot.telemetry(meters, frames)));
         }
-        (command, job)
+        (command, released)
     }
 
     /// The bytes that wait to be sent.

@@ -109,8 +109,9 @@ impl<'m> Autopilot<'m> {
     /// If it does not fit the flight stack; then there is none.
     pub fn load(&mut self, model: &'m Model<'m>, slot: Option<u8>) -> Result<(), Refusal> {
         self.model = None;
-        if let Some(settings) = &self.settings {
-            self.flight.attach(model, settings, Lanes::NONE)?;
+        match &self.settings {
+            Some(settings) => self.flight.attach(model, settings, Lanes::NONE)?,
+            None => self.flight.hold(model),
         }
         (self.model, self.slot) = (Some(model), slot);
         Ok(())
@@ -128,10 +129,10 @@ impl<'m> Autopilot<'m> {
             return Err(Reason::Settings);
         }
         (self.settings, self.news, self.state) = (Some(*settings), News::new(settings), State::ORIGIN);
-        if let Some(model) = self.model {
-            self.flight.attach(model, settings, Lanes::NONE).map_err(|refusal| Reason::Model((&refusal).into()))?;
+        match self.model {
+            Some(model) => Flight::accepts(model, &settings.rates).map_err(|refusal| Reason::Model((&refusal).into())),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     /// Whether the motors may turn.
@@ -186,15 +187,15 @@ impl<'m> Autopilot<'m> {
         })
     }
 
-    /// One control tick: what the motors get, and the network's job if there is one for a task of lower priority.
-    pub fn step(&mut self) -> (MotorCommand, Option<Job>) {
+    /// One control tick: what the motors get, and whether there is a job of the network for a task of lower priority.
+    pub fn step(&mut self, job: &mut Job) -> (MotorCommand, bool) {
         self.news.tick();
         if !self.armed {
-            return (MotorCommand::OFF, None);
+            return (MotorCommand::OFF, false);
         }
         if self.news.motors_off() {
             self.disarm();
-            return (MotorCommand::OFF, None);
+            return (MotorCommand::OFF, false);
         }
         let age = if self.news.lanes_off() { u16::MAX } else { 0 };
         if let Some(adapter) = self.flight.adapter() {
@@ -202,10 +203,10 @@ impl<'m> Autopilot<'m> {
             // The guard counts it, and waits before the lanes come back.
             adapter.set_age(age);
         }
-        let (command, job) = self.flight.control(self.tick, &self.state);
+        let (command, released) = self.flight.control_into(self.tick, &self.state, job);
         self.tick.0 = self.tick.0.wrapping_add(1);
         self.watch();
-        (command, job)
+        (command, released)
     }
 
     /// Takes what came of a job.
@@ -244,7 +245,7 @@ impl<'m> Autopilot<'m> {
                     report.trips.iter_mut().zip(counts).for_each(|(place, count)| *place = count);
                     report
                 };
-                let trips = adapter.guard().trips();
+                let trips = adapter.trips();
                 (lane(network, trips.network), lane(feedback, trips.feedback), adapter.late(), adapter.saturations())
             }
             None => Default::default(),

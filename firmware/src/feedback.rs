@@ -40,8 +40,20 @@ impl<'a> Lane<'a> {
     /// # Errors
     /// With the section or value that is wrong.
     pub fn new(layout: &LaneLayout, blob: &Blob<'a>) -> Result<Self, Refusal> {
-        let lags = usize::from(layout.lags);
-        let mut axes = Vec::new();
+        let mut lane = Self::empty(layout);
+        lane.fill(layout, blob)?;
+        Ok(lane)
+    }
+
+    /// A lane whose axes are yet to come.
+    pub(crate) fn empty(layout: &LaneLayout) -> Self {
+        Self { lags: layout.lags.into(), axes: Vec::new() }
+    }
+
+    /// Checks the axes and puts them into an empty lane.
+    #[inline(never)]
+    pub(crate) fn fill(&mut self, layout: &LaneLayout, blob: &Blob<'a>) -> Result<(), Refusal> {
+        let lags = self.lags;
         for axis in &layout.axes {
             let count = axis.errors.len() * lags;
             let coefficients = blob.floats(axis.coefficients, count + lags, "lane coefficients")?;
@@ -54,9 +66,9 @@ impl<'a> Lane<'a> {
             }
             // Without a slow part nothing is integrated.
             let integral_bound = if slow_gain == 0.0 { 0.0 } else { (axis.integral_limit / abs(slow_gain)).min(f32::MAX) };
-            let _ = axes.push(Axis { layout: axis.clone(), errors, outputs, slow_gain, integral_bound });
+            let _ = self.axes.push(Axis { layout: axis.clone(), errors, outputs, slow_gain, integral_bound });
         }
-        Ok(Self { lags, axes })
+        Ok(())
     }
 
     /// The axes in the order of the model's layout.

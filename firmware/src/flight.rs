@@ -66,7 +66,6 @@ pub type QuadrotorAdapter<'m> = Adapter<'m, DESIRED, MEASURED, REFERENCE>;
 /// The loops of a vehicle.
 #[derive(Debug)]
 struct Loops {
-    settings: Settings,
     position_divisor: NonZeroU32,
     position: PositionLoop,
     attitude: AttitudeLoop,
@@ -77,7 +76,6 @@ impl Loops {
     /// `None` if the airframe cannot be mixed.
     fn new(settings: &Settings) -> Option<Self> {
         Some(Self {
-            settings: *settings,
             position_divisor: NonZeroU32::new(settings.rates.position_divisor).unwrap_or(NonZeroU32::MIN),
             position: PositionLoop::new(settings.position, settings.airframe.mass, settings.rates.reference_hz()),
             attitude: AttitudeLoop::new(settings.attitude, settings.airframe.inertia),
@@ -86,37 +84,14 @@ impl Loops {
     }
 }
 
-/// An option that is all zeros while it is empty, so that a static with it takes no flash: the compiler would mark an empty `Option`
-/// with a byte of its own choice.
-#[derive(Debug)]
-#[repr(u8)]
-enum AddOn<T> {
-    Absent = 0,
-    Present(T) = 1,
-}
-
-impl<T> AddOn<T> {
-    fn as_ref(&self) -> Option<&T> {
-        match self {
-            Self::Absent => None,
-            Self::Present(addon) => Some(addon),
-        }
-    }
-
-    fn as_mut(&mut self) -> Option<&mut T> {
-        match self {
-            Self::Absent => None,
-            Self::Present(addon) => Some(addon),
-        }
-    }
-}
-
 /// The baseline loop with, if a model is given, the add-on before it.
 #[derive(Debug)]
 pub struct Flight<'m> {
     loops: Option<Loops>,
     preview: Preview<DESIRED, PREVIEW>,
-    adapter: AddOn<QuadrotorAdapter<'m>>,
+    adapter: QuadrotorAdapter<'m>,
+    /// Whether its model is for these settings.
+    fits: bool,
     wanted: ThrustVector,
     reference: Reference,
     excitation: Vector3<f32>,
@@ -130,7 +105,8 @@ impl<'m> Flight<'m> {
         Self {
             loops: None,
             preview: Preview::new([EndRule::Hold; DESIRED], 0),
-            adapter: AddOn::Absent,
+            adapter: QuadrotorAdapter::parked(),
+            fits: false,
             wanted: ThrustVector {
                 force: Vector3::new(0.0, 0.0, 0.0),
                 attitude: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
@@ -148,27 +124,30 @@ impl<'m> Flight<'m> {
         flight.configure(settings).then_some(flight)
     }
 
-    /// Back on the ground with these settings, without an add-on; `false`, and nothing changes, if the airframe cannot be mixed.
+    /// Back on the ground with these settings; `false`, and nothing changes, if the airframe cannot be mixed. An add-on stays, as it was when
+    /// it was attached but with its lanes off, if its model is for these settings.
     pub fn configure(&mut self, settings: &Settings) -> bool {
         let Some(loops) = Loops::new(settings) else { return false };
         self.loops = Some(loops);
-        self.adapter = AddOn::Absent;
-        self.land();
+        self.rest();
+        self.adapter.restart();
+        self.fits = self.adapter.model().is_some_and(|model| Self::accepts(model, &settings.rates).is_ok());
         true
     }
 
     /// Back on the ground: the next setpoint is that of reference tick 0, and nothing is left of the last flight but the lanes that are
     /// wanted and the counts.
     pub fn land(&mut self) {
-        if let Some(loops) = &mut self.loops
-            && let Some(fresh) = Loops::new(&loops.settings)
-        {
-            *loops = fresh;
+        if let Some(loops) = &mut self.loops {
+            loops.position.reset();
         }
+        self.rest();
+    }
+
+    /// Nothing is left of a flight but the integral of the position loop.
+    fn rest(&mut self) {
         self.preview.restart(quadrotor::END_RULES, 0);
-        if let Some(adapter) = self.adapter.as_mut() {
-            adapter.reset();
-        }
+        self.adapter.reset();
         (self.wanted, self.reference, self.excitation) = (ThrustVector::NONE, Reference::ORIGIN, Vector3::zeros());
         self.on_the_way.clear();
     }
@@ -179,12 +158,17 @@ impl<'m> Flight<'m> {
     /// If the model is for other signals, another rate, or a longer preview.
     pub fn attach(&mut self, model: &'m Model<'m>, settings: &Settings, lanes: Lanes) -> Result<(), Refusal> {
         Self::accepts(model, &settings.rates)?;
-        self.adapter = AddOn::Present(Adapter::tied(model, base_channels()));
-        if let Some(adapter) = self.adapter.as_mut() {
-            adapter.defer();
-            adapter.switch(lanes);
-        }
+        self.hold(model);
+        self.adapter.switch(lanes);
+        self.fits = true;
         Ok(())
+    }
+
+    /// Has a model ready for settings which it is for ([`Flight::configure`]).
+    pub(crate) fn hold(&mut self, model: &'m Model<'m>) {
+        self.adapter.tie(model, &quadrotor::signals());
+        self.adapter.defer();
+        self.fits = false;
     }
 
     /// Whether [`Flight::attach`] takes a model.
@@ -198,7 +182,7 @@ impl<'m> Flight<'m> {
 
     /// The add-on, if there is one.
     pub fn adapter(&mut self) -> Option<&mut QuadrotorAdapter<'m>> {
-        self.adapter.as_mut()
+        self.fits.then_some(&mut self.adapter)
     }
 
     /// Appends the desired state of the next reference tick.
@@ -249,7 +233,7 @@ impl<'m> Flight<'m> {
     pub fn step<const S: usize>(&mut self, tick: Tick, state: &State, scratch: &mut Scratch<S>) -> MotorCommand {
         let (command, job) = self.control(tick, state);
         if let Some(job) = job
-            && let Some(network) = self.adapter.as_ref().and_then(|adapter| adapter.model().network())
+            && let Some(network) = self.adapter.model().and_then(Model::network)
         {
             self.deliver(job.run(network, scratch));
         }
@@ -259,11 +243,19 @@ impl<'m> Flight<'m> {
     /// One control tick without the network, whose job a task of lower priority may do until the next reference tick
     /// ([`Flight::deliver`]): the same bits as [`Flight::step`].
     pub fn control(&mut self, tick: Tick, state: &State) -> (MotorCommand, Option<Job>) {
-        let mut job = None;
-        let Some(loops) = &mut self.loops else { return (MotorCommand::OFF, job) };
+        let mut job = Job::EMPTY;
+        let (command, released) = self.control_into(tick, state, &mut job);
+        (command, released.then_some(job))
+    }
+
+    /// [`Flight::control`] that puts the job, if there is one, where the caller has room for it: `true`.
+    pub fn control_into(&mut self, tick: Tick, state: &State, job: &mut Job) -> (MotorCommand, bool) {
+        let mut released = false;
+        let Some(loops) = &mut self.loops else { return (MotorCommand::OFF, released) };
         if tick.0.is_multiple_of(loops.position_divisor.get()) {
             let reference_tick = (tick.0 / loops.position_divisor) as i32;
-            (self.reference, job) = adapted(&self.preview, self.adapter.as_mut(), reference_tick, state);
+            (self.reference, released) =
+                adapted(&self.preview, self.fits.then_some(&mut self.adapter), reference_tick, state, job);
             if self.excitation != Vector3::zeros() {
                 self.reference.position += self.excitation;
             }
@@ -279,41 +271,34 @@ impl<'m> Flight<'m> {
             self.wanted = wanted;
         }
         let (thrust, moment) = loops.attitude.step(&self.wanted, state);
-        (loops.mixer.mix(thrust, &moment), job)
+        (loops.mixer.mix(thrust, &moment), released)
     }
 
     /// Takes what came of a job of [`Flight::control`].
     pub fn deliver(&mut self, inference: Inference) {
-        if let Some(adapter) = self.adapter.as_mut() {
-            adapter.deliver(inference);
-        }
+        self.adapter.deliver(inference);
     }
 }
 
-/// Not inlined: the table takes 1.4 KB of the stack.
-#[inline(never)]
-fn base_channels() -> [usize; REFERENCE] {
-    QuadrotorAdapter::base(&quadrotor::signals())
-}
-
-/// The reference at a reference tick, and the network's job if there is one.
+/// The reference at a reference tick, and whether the network has a job.
 fn adapted(
     preview: &Preview<DESIRED, PREVIEW>,
     adapter: Option<&mut QuadrotorAdapter<'_>>,
     tick: i32,
     state: &State,
-) -> (Reference, Option<Job>) {
+    job: &mut Job,
+) -> (Reference, bool) {
     let desired = preview.sample(tick);
     let yaw = desired[9];
     match adapter {
         Some(adapter) => {
             let measured = quadrotor::measured(state);
-            let job = adapter.begin(tick, preview, &measured);
-            (quadrotor::reference(&adapter.finish(tick, preview, &measured), yaw), job)
+            let released = adapter.begin_into(tick, preview, &measured, job);
+            (quadrotor::reference(&adapter.finish(tick, preview, &measured), yaw), released)
         }
         None => {
             let [px, py, pz, vx, vy, vz, ..] = desired;
-            (quadrotor::reference(&[px, py, pz, vx, vy, vz], yaw), None)
+            (quadrotor::reference(&[px, py, pz, vx, vy, vz], yaw), false)
         }
     }
 }

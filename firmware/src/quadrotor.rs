@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 use crate::{
     math::{coarse_asin, coarse_atan2},
-    model::{Channel, MAX_CHANNELS, SignalTable},
+    model::{Channel, Channels},
     preview::EndRule,
     types::{Reference, Setpoint, State},
 };
@@ -19,45 +19,50 @@ pub const MEASURED: usize = 13;
 /// Reference channels: position, velocity.
 pub const REFERENCE: usize = 6;
 
-const POSITION: [&str; 3] = ["position.x", "position.y", "position.z"];
-const VELOCITY: [&str; 3] = ["velocity.x", "velocity.y", "velocity.z"];
-
-fn channels<'a>(
-    names: impl IntoIterator<Item = &'a str>,
-    unit: &'a str,
-    frame: &'a str,
-    end: EndRule,
-) -> impl Iterator<Item = Channel<'a>> {
-    names.into_iter().map(move |name| Channel { name, unit, frame, end })
+const fn metres(name: &'static str) -> Channel<'static> {
+    Channel { name, unit: "m", frame: WORLD, end: EndRule::Hold }
 }
 
-/// The channels as a list. Unlike `collect` it has no panic, whether the compiler can count them or not; a test counts them.
-fn listed<'a>(channels: impl Iterator<Item = Channel<'a>>) -> heapless::Vec<Channel<'a>, MAX_CHANNELS> {
-    let mut list = heapless::Vec::new();
-    for channel in channels {
-        let _ = list.push(channel);
-    }
-    list
+const fn speed(name: &'static str) -> Channel<'static> {
+    Channel { name, unit: "m/s", frame: WORLD, end: EndRule::Zero }
 }
 
-/// The signal table of the flight stack.
-pub fn signals() -> SignalTable<'static> {
-    let world = "world ENU";
-    let position = || channels(POSITION, "m", world, EndRule::Hold);
-    let velocity = || channels(VELOCITY, "m/s", world, EndRule::Zero);
-    let acceleration = channels(["acceleration.x", "acceleration.y", "acceleration.z"], "m/s^2", world, EndRule::Zero);
-    let angles = channels(["roll", "pitch", "yaw"], "rad", "body FLU to world ENU", EndRule::Hold);
-    let rates = channels(["rate.x", "rate.y", "rate.z"], "rad/s", "body FLU", EndRule::Hold);
-    SignalTable {
-        desired: listed(position().chain(velocity()).chain(acceleration).chain(channels(["yaw"], "rad", world, EndRule::Hold))),
-        measured: listed(position().chain(velocity()).chain(angles).chain(rates).chain(channels(
-            ["acceleration.z"],
-            "m/s^2",
-            world,
-            EndRule::Hold,
-        ))),
-        reference: listed(position().chain(velocity())),
-    }
+const fn acceleration(name: &'static str, end: EndRule) -> Channel<'static> {
+    Channel { name, unit: "m/s^2", frame: WORLD, end }
+}
+
+const fn angle(name: &'static str, frame: &'static str) -> Channel<'static> {
+    Channel { name, unit: "rad", frame, end: EndRule::Hold }
+}
+
+const fn rate(name: &'static str) -> Channel<'static> {
+    Channel { name, unit: "rad/s", frame: "body FLU", end: EndRule::Hold }
+}
+
+const WORLD: &str = "world ENU";
+const ATTITUDE: &str = "body FLU to world ENU";
+const X: Channel<'_> = metres("position.x");
+const Y: Channel<'_> = metres("position.y");
+const Z: Channel<'_> = metres("position.z");
+const VX: Channel<'_> = speed("velocity.x");
+const VY: Channel<'_> = speed("velocity.y");
+const VZ: Channel<'_> = speed("velocity.z");
+const AX: Channel<'_> = acceleration("acceleration.x", EndRule::Zero);
+const AY: Channel<'_> = acceleration("acceleration.y", EndRule::Zero);
+const AZ: Channel<'_> = acceleration("acceleration.z", EndRule::Zero);
+const RISE: Channel<'_> = acceleration("acceleration.z", EndRule::Hold);
+const ROLL: Channel<'_> = angle("roll", ATTITUDE);
+const PITCH: Channel<'_> = angle("pitch", ATTITUDE);
+const YAW: Channel<'_> = angle("yaw", ATTITUDE);
+
+static DESIRED_CHANNELS: [Channel<'_>; DESIRED] = [X, Y, Z, VX, VY, VZ, AX, AY, AZ, angle("yaw", WORLD)];
+static MEASURED_CHANNELS: [Channel<'_>; MEASURED] =
+    [X, Y, Z, VX, VY, VZ, ROLL, PITCH, YAW, rate("rate.x"), rate("rate.y"), rate("rate.z"), RISE];
+static REFERENCE_CHANNELS: [Channel<'_>; REFERENCE] = [X, Y, Z, VX, VY, VZ];
+
+/// The signals of the flight stack.
+pub fn signals() -> Channels<'static> {
+    Channels { desired: &DESIRED_CHANNELS, measured: &MEASURED_CHANNELS, reference: &REFERENCE_CHANNELS }
 }
 
 /// End rules of the desired channels.
@@ -93,9 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tables_count_as_many_channels_as_the_arrays() {
-        let table = signals();
-        assert_eq!([table.desired.len(), table.measured.len(), table.reference.len()], [DESIRED, MEASURED, REFERENCE]);
-        assert!(table.desired.iter().zip(END_RULES).all(|(channel, rule)| channel.end == rule));
+    fn end_rules_are_those_of_the_table() {
+        assert!(signals().desired.iter().zip(END_RULES).all(|(channel, rule)| channel.end == rule));
     }
 }

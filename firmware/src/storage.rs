@@ -8,7 +8,7 @@
 //! slot that flies is borrowed by its model, so no code can write to it.
 //!
 //! ```
-//! use impromptu_firmware::storage::{self, Arming, RamFlash};
+//! use impromptu_firmware::{network::Scratch, storage::{self, Arming, RamFlash}};
 //! # let file: &[u8] = include_bytes!("../../tests/golden/models/int8-lane.model");
 //! # let checksum = impromptu_firmware::model::file::checksum(file);
 //!
@@ -19,7 +19,7 @@
 //! while let Some(chunk) = file.get(next as usize..).and_then(|rest| rest.chunks(100).next()) {
 //!     next = uploader.write(Arming::Disarmed, next, chunk)?;
 //! }
-//! uploader.commit(Arming::Disarmed, |_| Ok(()))?;
+//! uploader.commit(Arming::Disarmed, &mut Scratch::new(), |_| Ok(()))?;
 //!
 //! let (stored, _) = storage::open(&mut slots, |_| Ok(()));
 //! assert_eq!(stored.map(|stored| stored.checksum()), Some(checksum));
@@ -38,7 +38,10 @@ mod uploader;
 
 use embedded_storage::nor_flash::NorFlash;
 
-use crate::model::{Model, Refusal};
+use crate::{
+    model::{Model, Refusal},
+    network::Scratch,
+};
 
 pub use error::{Operation, StorageError};
 pub use header::{HEADER, Header, MAGIC, Sequence, VERSION};
@@ -72,7 +75,7 @@ pub fn open<'a, S: Slot>(
     slots: &'a mut [S; 2],
     check: impl Fn(&Model<'_>) -> Result<(), Refusal>,
 ) -> (Option<Stored<'a>>, Uploader<&'a mut S>) {
-    let Survey { flies, spare, sequence } = survey(slots.each_ref().map(Slot::bytes), check);
+    let Survey { flies, spare, sequence } = survey(slots.each_ref().map(Slot::bytes), &mut Scratch::new(), check);
     let found = flies.is_some();
     let [first, second] = slots;
     let (kept, spare) = match spare {

@@ -37,6 +37,12 @@ pub struct Signals {
 
 impl From<&model::SignalTable<'_>> for Signals {
     fn from(table: &model::SignalTable<'_>) -> Self {
+        (&model::Channels::from(table)).into()
+    }
+}
+
+impl From<&model::Channels<'_>> for Signals {
+    fn from(table: &model::Channels<'_>) -> Self {
         let owned = |channels: &[Channel<'_>]| {
             channels
                 .iter()
@@ -48,7 +54,7 @@ impl From<&model::SignalTable<'_>> for Signals {
                 })
                 .collect()
         };
-        Self { desired: owned(&table.desired), measured: owned(&table.measured), reference: owned(&table.reference) }
+        Self { desired: owned(table.desired), measured: owned(table.measured), reference: owned(table.reference) }
     }
 }
 

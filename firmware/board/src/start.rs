@@ -4,7 +4,7 @@ use impromptu_firmware::{
     application::Application,
     flight::Flight,
     model::{Model, Refusal},
-    network::Network,
+    network::{Network, Scratch},
     storage::{Place, Sequence, Survey, survey},
 };
 use static_cell::ConstStaticCell;
@@ -21,22 +21,25 @@ pub struct Start {
     pub spare: Place,
     /// Its number.
     pub sequence: Sequence,
+    /// For the inference and the storage task, neither of which interrupts the other.
+    pub scratch: &'static mut Scratch,
 }
 
 /// Looks at the slots and sets the application up; once, since it lies in a static. `None`: the airframe cannot be mixed.
 #[inline(never)]
 pub fn start(slots: [&'static [u8]; 2]) -> Option<Start> {
     static APPLICATION: ConstStaticCell<Application<'static>> = ConstStaticCell::new(Application::new());
-    let application = APPLICATION.take();
+    static SCRATCH: ConstStaticCell<Scratch> = ConstStaticCell::new(Scratch::new());
+    let (application, scratch) = (APPLICATION.take(), SCRATCH.take());
     let autopilot = application.autopilot();
     autopilot.configure(&CRAZYFLIE).ok()?;
-    let Survey { flies, spare, sequence } = survey(slots, fits);
-    let model = flies.and_then(|stored| model(stored.file()));
+    let Survey { flies, spare, sequence } = survey(slots, scratch, fits);
+    let model = flies.and_then(|stored| model(stored.file(), scratch));
     if let Some(model) = model {
         // It was checked to fit.
         let _ = autopilot.load(model, Some(u8::from(spare == Place::First)));
     }
-    Some(Start { application, network: model.and_then(Model::network), spare, sequence })
+    Some(Start { application, network: model.and_then(Model::network), spare, sequence, scratch })
 }
 
 /// Whether a model is for this vehicle.
@@ -48,7 +51,7 @@ pub fn fits(model: &Model<'_>) -> Result<(), Refusal> {
 }
 
 #[inline(never)]
-fn model(file: &'static [u8]) -> Option<&'static Model<'static>> {
+fn model(file: &'static [u8], scratch: &mut Scratch) -> Option<&'static Model<'static>> {
     static MODEL: ConstStaticCell<Model<'static>> = ConstStaticCell::new(Model::VACANT);
-    Model::load_into(MODEL.take(), file).ok()
+    Model::load_into(MODEL.take(), file, scratch).ok()
 }

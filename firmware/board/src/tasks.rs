@@ -82,7 +82,8 @@ impl Tasks {
     }
 
     /// Control: hears bytes of the link; whether the storage has a piece to store.
-    #[inline]
+    // Apart from the flight, which needs none of its stack.
+    #[inline(never)]
     pub fn hear(&self, application: &mut Application<'_>, bytes: &[u8]) -> bool {
         let mut piece = false;
         for byte in bytes {
@@ -95,11 +96,12 @@ impl Tasks {
     }
 
     /// Control: flies a tick; `heard` is what hearing for it cost.
-    #[inline]
+    #[inline(never)]
     pub fn fly(&self, application: &mut Application<'_>, meters: &mut Meters, counter: &impl Cost, heard: u32) -> Tick {
         // With the first tick of a flight comes its trajectory.
         let flying = application.autopilot().in_flight();
-        let ((command, job), flown) = counter.measure(|| {
+        let mut job = Job::EMPTY;
+        let ((command, released), flown) = counter.measure(|| {
             if let Some((tick, outputs)) = self.inferences.take_floats() {
                 application.deliver(Inference { tick: tick as i32, outputs });
             }
@@ -108,11 +110,11 @@ impl Tasks {
             {
                 application.acknowledge(sequence as u8, outcome);
             }
-            let (command, job) = application.step(meters);
-            if let Some(Job { tick, inputs }) = &job {
-                self.jobs.put_floats(*tick as u32, inputs);
+            let (command, released) = application.step(meters, &mut job);
+            if released {
+                self.jobs.put_floats(job.tick as u32, &job.inputs);
             }
-            (command, job.is_some())
+            (command, released)
         });
         let cost = heard.saturating_add(flown);
         if flying {
@@ -121,7 +123,7 @@ impl Tasks {
         meters.inference_max = self.inference_max.load(Ordering::Relaxed);
         meters.stack_bytes = self.stack.load(Ordering::Relaxed);
         self.control_total.fetch_add(cost, Ordering::Relaxed);
-        Tick { command, job, cost }
+        Tick { command, job: released, cost }
     }
 
     /// Inference: does the job that waits.
@@ -140,10 +142,10 @@ impl Tasks {
 
     /// Storage: stores the piece that waits.
     #[inline]
-    pub fn store<S: Slot>(&self, uploader: &mut Uploader<S>) {
+    pub fn store<S: Slot>(&self, uploader: &mut Uploader<S>, scratch: &mut Scratch) {
         let Some((_, words)) = self.uploads.take() else { return };
         let upload = Upload::from_words(words);
-        let outcome = upload.carry_out(uploader, fits);
+        let outcome = upload.carry_out(uploader, scratch, fits);
         self.outcomes.put(upload.sequence.into(), &outcome_words(&outcome));
     }
 

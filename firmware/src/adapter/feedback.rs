@@ -28,6 +28,14 @@ impl Feedback {
     /// At rest.
     pub(super) const REST: Self = Self { axes: [AxisState::REST; MAX_AXES], vigour: 0.0 };
 
+    /// As [`Feedback::REST`], in place.
+    pub(super) fn reset(&mut self) {
+        for axis in &mut self.axes {
+            *axis = AxisState::REST;
+        }
+        self.vigour = 0.0;
+    }
+
     /// Share of the fast clamps that the feedback lane may use at this tick, at which its axes have these errors.
     fn authority<const D: usize, const N: usize>(
         &mut self,

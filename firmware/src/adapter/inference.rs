@@ -28,6 +28,9 @@ pub struct Inference {
 }
 
 impl Job {
+    /// Where one is put.
+    pub const EMPTY: Self = Self { tick: 0, inputs: [0.0; MAX_FEATURES] };
+
     /// Evaluates the network. With a scratch of fewer words than the network needs every correction is zero.
     pub fn run<const S: usize>(&self, network: &Network<'_>, scratch: &mut Scratch<S>) -> Inference {
         let mut outputs = [0.0; MAX_OUTPUTS];

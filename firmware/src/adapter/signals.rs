@@ -5,7 +5,7 @@
 
 use crate::{
     features::Signals,
-    model::{Card, Refusal, SignalTable},
+    model::{Card, Channels, Refusal},
     preview::Preview,
 };
 
@@ -55,7 +55,7 @@ pub(super) fn matched_error<const D: usize, const N: usize>(
 }
 
 /// Desired channel of the same name for each reference channel.
-pub(super) fn base_channels<const R: usize>(table: &SignalTable<'_>) -> [usize; R] {
+pub(super) fn base_channels<const R: usize>(table: &Channels<'_>) -> [usize; R] {
     core::array::from_fn(|r| {
         let name = table.reference.get(r).map(|channel| channel.name);
         table.desired.iter().position(|desired| Some(desired.name) == name).unwrap_or(0)
@@ -64,11 +64,11 @@ pub(super) fn base_channels<const R: usize>(table: &SignalTable<'_>) -> [usize; 
 
 /// Refuses a model whose channels are not the application's, or do not fit into arrays of `limits` channels. Array elements behind the
 /// table's channels are not used.
-pub(super) fn same_signals(card: &Card<'_>, table: &SignalTable<'_>, limits: [usize; 3]) -> Result<(), Refusal> {
+pub(super) fn same_signals(card: &Card<'_>, table: &Channels<'_>, limits: [usize; 3]) -> Result<(), Refusal> {
     let pairs = [
-        ("desired", &card.signals.desired, &table.desired),
-        ("measured", &card.signals.measured, &table.measured),
-        ("reference", &card.signals.reference, &table.reference),
+        ("desired", &card.signals.desired, table.desired),
+        ("measured", &card.signals.measured, table.measured),
+        ("reference", &card.signals.reference, table.reference),
     ];
     for ((signal, model, application), limit) in pairs.into_iter().zip(limits) {
         let differs = model.iter().zip(application).position(|(a, b)| a != b);

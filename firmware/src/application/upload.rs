@@ -6,6 +6,7 @@
 use crate::{
     link::{CHUNK, Command, Outcome, Reason, message::ModelChunk},
     model::{Model, Refusal},
+    network::Scratch,
     storage::{Arming, Slot, StorageError, Uploader},
 };
 
@@ -57,10 +58,11 @@ impl Upload {
     }
 
     /// Carries the command out, which may take seconds; the motors must be off until it returns ([`super::Application::hear`] sees to
-    /// that). `check` as for [`Uploader::commit`]. A beginning of what had begun before is answered with the offset where it goes on.
+    /// that). `scratch` and `check` as for [`Uploader::commit`]. A beginning of what had begun before is answered with the offset where it goes on.
     pub fn carry_out<S: Slot>(
         &self,
         uploader: &mut Uploader<S>,
+        scratch: &mut Scratch,
         check: impl FnOnce(&Model<'_>) -> Result<(), Refusal>,
     ) -> Outcome {
         let stored = self.with(|command| match command {
@@ -70,7 +72,7 @@ impl Upload {
                 Err(error) => Err(error),
             },
             Command::ModelChunk(chunk) => uploader.write(Arming::Disarmed, chunk.offset, chunk.bytes).map(|_| ()),
-            _ => uploader.commit(Arming::Disarmed, check).map(|_| ()),
+            _ => uploader.commit(Arming::Disarmed, scratch, check).map(|_| ()),
         });
         match stored {
             Ok(()) => Outcome::Done,
@@ -156,7 +158,7 @@ mod tests {
     /// The command's outcome, by way of both mailboxes.
     fn obey<S: Slot>(uploader: &mut Uploader<S>, command: Command<'_>) -> Outcome {
         let upload = Upload::from_words(*Upload::new(1, &command).unwrap().words());
-        let outcome = upload.carry_out(uploader, |_| Ok(()));
+        let outcome = upload.carry_out(uploader, &mut Scratch::new(), |_| Ok(()));
         assert_eq!(outcome_from_words(outcome_words(&outcome)), Some(outcome));
         outcome
     }

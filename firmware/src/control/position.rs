@@ -63,6 +63,11 @@ impl PositionLoop {
         }
     }
 
+    /// As it was made, in place.
+    pub fn reset(&mut self) {
+        (self.integral, self.yaw, self.heading, self.attitude) = (Vector3::zeros(), 0.0, Vector3::x(), Matrix3::identity());
+    }
+
     /// Nonlinear transformation: the acceleration that PD (and integral) ask for, plus gravity, as a thrust vector.
     pub fn step(&mut self, reference: &Reference, state: &State) -> ThrustVector {
         let position_error = reference.position - state.position;

@@ -32,12 +32,12 @@ impl<const WORDS: usize> Mailbox<WORDS> {
 
     /// Producer: replaces the value.
     pub fn put(&self, stamp: u32, words: &[u32; WORDS]) {
-        self.put_interrupted(stamp, words, || ());
+        self.put_interrupted(stamp, words.iter().copied(), || ());
     }
 
     /// Producer: replaces the value by numbers, bit by bit.
     pub fn put_floats(&self, stamp: u32, values: &[f32; WORDS]) {
-        self.put(stamp, &values.map(f32::to_bits));
+        self.put_interrupted(stamp, values.iter().map(|value| value.to_bits()), || ());
     }
 
     /// Consumer: stamp and words of the newest value, once. `None` if there is no newer one, or it is half-written.
@@ -51,7 +51,7 @@ impl<const WORDS: usize> Mailbox<WORDS> {
     }
 
     /// `interrupt` stands for whatever runs between two steps.
-    fn put_interrupted(&self, stamp: u32, words: &[u32; WORDS], mut interrupt: impl FnMut()) {
+    fn put_interrupted(&self, stamp: u32, words: impl Iterator<Item = u32>, mut interrupt: impl FnMut()) {
         let version = self.version.load(Ordering::Relaxed);
         interrupt();
         self.version.store(version.wrapping_add(1), Ordering::Relaxed);
@@ -61,7 +61,7 @@ impl<const WORDS: usize> Mailbox<WORDS> {
         self.stamp.store(stamp, Ordering::Relaxed);
         for (place, word) in self.words.iter().zip(words) {
             interrupt();
-            place.store(*word, Ordering::Relaxed);
+            place.store(word, Ordering::Relaxed);
         }
         interrupt();
         // Whoever sees the even version sees all of the new words.
@@ -130,7 +130,7 @@ mod tests {
         for at in 0..STEPS {
             let (mailbox, step) = (Mailbox::new(), Cell::new(0));
             mailbox.put(1, &[1; 4]);
-            mailbox.put_interrupted(2, &[2; 4], || {
+            mailbox.put_interrupted(2, [2; 4].into_iter(), || {
                 if step.replace(step.get() + 1) == at {
                     assert_eq!(mailbox.take(), (at == 0).then_some(filled(1)), "at step {at}");
                 }

@@ -67,6 +67,16 @@ impl<const N: usize> ByteRing<N> {
         Some(byte)
     }
 
+    /// Consumer: the oldest bytes, as many as wait and there is room for.
+    pub fn take_some<'p>(&self, place: &'p mut [u8]) -> &'p [u8] {
+        let mut count = 0;
+        for (to, byte) in place.iter_mut().zip(core::iter::from_fn(|| self.take())) {
+            *to = byte;
+            count += 1;
+        }
+        place.get(..count).unwrap_or_default()
+    }
+
     /// Bytes that wait.
     pub fn len(&self) -> usize {
         // This order: a consumer that takes a byte in between makes the answer too small, never negative.

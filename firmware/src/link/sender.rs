@@ -42,4 +42,9 @@ impl Sender {
         self.next = sequence.wrapping_add(1);
         Some((sequence, frame))
     }
+
+    /// Counts a frame that is not sent, so that the receiver notices that one is missing.
+    pub fn skip(&mut self) {
+        self.next = self.next.wrapping_add(1);
+    }
 }

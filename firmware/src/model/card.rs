@@ -69,6 +69,29 @@ pub struct SignalTable<'a> {
     pub reference: Vec<Channel<'a>, MAX_CHANNELS>,
 }
 
+/// The signals of an application, in its own order: what a model's [`SignalTable`] must say.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Channels<'a> {
+    /// Channels of the desired trajectory.
+    pub desired: &'a [Channel<'a>],
+    /// Channels of the measured state.
+    pub measured: &'a [Channel<'a>],
+    /// Channels of the reference; each has the name of the desired channel that it starts from.
+    pub reference: &'a [Channel<'a>],
+}
+
+impl<'a> From<&'a SignalTable<'a>> for Channels<'a> {
+    fn from(SignalTable { desired, measured, reference }: &'a SignalTable<'a>) -> Self {
+        Self { desired, measured, reference }
+    }
+}
+
+impl<'a> From<&Channels<'a>> for Channels<'a> {
+    fn from(channels: &Channels<'a>) -> Self {
+        *channels
+    }
+}
+
 /// Where a model comes from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Provenance<'a> {

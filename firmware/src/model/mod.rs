@@ -19,7 +19,11 @@ pub use card::*;
 pub use place::Place;
 pub use refusal::Refusal;
 
-use crate::{feedback::Lane, guard::Monitor, network::Network};
+use crate::{
+    feedback::Lane,
+    guard::Monitor,
+    network::{Network, Scratch},
+};
 
 /// A model that passed every check.
 #[derive(Debug)]
@@ -53,49 +57,42 @@ impl<'a> Model<'a> {
     /// A [`Refusal`] that names what is wrong: header, check sum, card, shapes, indices, values, probes.
     pub fn from_bytes(bytes: &'a [u8]) -> Result<Self, Refusal> {
         let mut model = Self::VACANT;
-        model.load(bytes)?;
+        model.load(bytes, &mut Scratch::new())?;
         Ok(model)
     }
 
-    /// [`Model::from_bytes`] into `place`: for a model in a static, since 3 KB are much for the stack of a microcontroller. After a
-    /// refusal it has neither network nor lane.
+    /// [`Model::from_bytes`] into `place`, with the caller's working memory for the probes: for a model in a static, since 3 KB and 2 KB are
+    /// much for the stack of a microcontroller. After a refusal it has neither network nor lane.
     ///
     /// # Errors
     /// As [`Model::from_bytes`].
-    pub fn load_into<'p>(place: &'p mut Self, bytes: &'a [u8]) -> Result<&'p Self, Refusal> {
-        if let Err(refusal) = place.load(bytes) {
+    pub fn load_into<'p>(place: &'p mut Self, bytes: &'a [u8], scratch: &mut Scratch) -> Result<&'p Self, Refusal> {
+        if let Err(refusal) = place.load(bytes, scratch) {
             (place.network, place.lane) = (None, None);
             return Err(refusal);
         }
         Ok(place)
     }
 
+    /// Stage by stage, none of which leaves anything on the stack for the next.
     #[inline(never)]
-    fn load(&mut self, bytes: &'a [u8]) -> Result<(), Refusal> {
+    fn load(&mut self, bytes: &'a [u8], scratch: &mut Scratch) -> Result<(), Refusal> {
         let Self { card, blob, network, lane, monitor, envelope, bounds, checksum } = self;
-        let (card_bytes, blob_bytes) = file::split(bytes)?;
-        match decode::card(card_bytes, card) {
-            Some([]) => {}
-            Some(_) => return Err(Refusal::Card),
-            None => return Err(counts::refusal(card_bytes)),
-        }
-        *blob = Blob::new(blob_bytes);
+        load_card(bytes, card, blob)?;
         validate::card(card)?;
-        *network = match &card.network {
-            Some(layout) => Some(Network::new(layout, blob, card.features.len(), card.outputs.len())?),
-            None => None,
-        };
-        *lane = match &card.lane {
-            Some(layout) => Some(Lane::new(layout, blob)?),
-            None => None,
-        };
-        *envelope = blob.floats(card.envelope, 2 * card.features.len(), "envelope")?.split_at(card.features.len());
-        if envelope.0.iter().zip(envelope.1.iter()).any(|(low, high)| low > high) {
-            return Err(Refusal::Value { what: "envelope" });
+        (*network, *lane, *monitor) = (None, None, None);
+        if let Some(layout) = &card.network {
+            Network::load(network, layout, blob, card.features.len(), card.outputs.len())?;
         }
-        *monitor = card.monitor.as_ref().map(|layout| Monitor::new(layout, blob)).transpose()?;
-        *bounds = Bounds::new(card, blob)?;
-        validate::probes(card, blob, network.as_ref().map(|network| (network, &*envelope, &*bounds)), lane.as_ref())?;
+        if let Some(layout) = &card.lane {
+            lane.insert(Lane::empty(layout)).fill(layout, blob)?;
+        }
+        load_rest(card, blob, envelope, monitor, bounds)?;
+        let checked = network.as_ref().map(|network| (network, &*envelope, &*bounds));
+        validate::network_probes(card, blob, checked, scratch)?;
+        if let Some(lane) = lane {
+            validate::lane_probe(card, blob, lane)?;
+        }
         *checksum = file::checksum(bytes);
         Ok(())
     }
@@ -139,4 +136,34 @@ impl<'a> Model<'a> {
     pub fn checksum(&self) -> u32 {
         self.checksum
     }
+}
+
+#[inline(never)]
+fn load_card<'a>(bytes: &'a [u8], card: &mut Card<'a>, blob: &mut Blob<'a>) -> Result<(), Refusal> {
+    let (card_bytes, blob_bytes) = file::split(bytes)?;
+    *blob = Blob::new(blob_bytes);
+    match decode::card(card_bytes, card) {
+        Some([]) => Ok(()),
+        Some(_) => Err(Refusal::Card),
+        None => Err(counts::refusal(card_bytes)),
+    }
+}
+
+#[inline(never)]
+fn load_rest<'a>(
+    card: &Card<'a>,
+    blob: &Blob<'a>,
+    envelope: &mut (Floats<'a>, Floats<'a>),
+    monitor: &mut Option<Monitor<'a>>,
+    bounds: &mut Bounds<'a>,
+) -> Result<(), Refusal> {
+    *envelope = blob.floats(card.envelope, 2 * card.features.len(), "envelope")?.split_at(card.features.len());
+    if envelope.0.iter().zip(envelope.1.iter()).any(|(low, high)| low > high) {
+        return Err(Refusal::Value { what: "envelope" });
+    }
+    if let Some(layout) = &card.monitor {
+        *monitor = Some(Monitor::new(layout, blob)?);
+    }
+    *bounds = Bounds::new(card, blob)?;
+    Ok(())
 }

@@ -13,6 +13,7 @@ const MAX_OFFSET_TICKS: i32 = 10_000;
 const RATES_HZ: core::ops::RangeInclusive<f32> = 1e-3..=1e6;
 
 /// Indices, ranges and values of a card.
+#[inline(never)]
 pub(super) fn card(card: &Card<'_>) -> Result<(), Refusal> {
     timing(card)?;
     signals(card)?;
@@ -186,39 +187,40 @@ fn monitor(card: &Card<'_>, monitor: &MonitorLayout) -> Result<(), Refusal> {
 /// Smallest and largest value of each feature.
 type Envelope<'a> = (Floats<'a>, Floats<'a>);
 
-/// Re-runs the probes: the bits must be the file's, and within its bounds.
-pub(super) fn probes<'a>(
+/// Re-runs the network's probes: the bits must be the file's, and within its bounds.
+#[inline(never)]
+pub(super) fn network_probes<'a>(
     card: &Card<'a>,
     blob: &Blob<'a>,
     network: Option<(&Network<'a>, &Envelope<'a>, &Bounds<'a>)>,
-    lane: Option<&Lane<'_>>,
+    scratch: &mut Scratch,
 ) -> Result<(), Refusal> {
     let (inputs, outputs) = (card.features.len(), card.outputs.len());
     let count = usize::from(card.probes.count);
     let stored = blob.floats(card.probes.network, count * (inputs + outputs), "network probes")?;
     let (probe_inputs, probe_outputs) = stored.split_at(count * inputs);
-    if let Some((network, envelope, bounds)) = network {
-        let mut scratch = Scratch::new();
-        let (mut x, mut y) = ([0.0; super::MAX_FEATURES], [0.0; super::MAX_OUTPUTS]);
-        for probe in 0..count {
-            for (i, value) in x.iter_mut().enumerate().take(inputs) {
-                *value = probe_inputs.get(probe * inputs + i);
-            }
-            network.evaluate(&x, &mut y, &mut scratch);
-            let same =
-                (0..outputs).all(|o| y.get(o).is_some_and(|y| y.to_bits() == probe_outputs.get(probe * outputs + o).to_bits()));
-            if !same {
-                return Err(Refusal::Probe { index: probe as u8 });
-            }
-            bounds.check(&x, &y, envelope)?;
+    let Some((network, envelope, bounds)) = network else { return Ok(()) };
+    let (mut x, mut y) = ([0.0; super::MAX_FEATURES], [0.0; super::MAX_OUTPUTS]);
+    for probe in 0..count {
+        for (i, value) in x.iter_mut().enumerate().take(inputs) {
+            *value = probe_inputs.get(probe * inputs + i);
         }
-    }
-    if let Some(lane) = lane {
-        let expected = blob.floats(card.probes.lane, lane.axes().len(), "lane probe")?;
-        let found = feedback::probe(lane, 1.0 / card.timing.reference_rate_hz);
-        if !expected.iter().zip(found).all(|(expected, found)| expected.to_bits() == found.to_bits()) {
-            return Err(Refusal::Probe { index: u8::MAX });
+        network.evaluate(&x, &mut y, scratch);
+        let same =
+            (0..outputs).all(|o| y.get(o).is_some_and(|y| y.to_bits() == probe_outputs.get(probe * outputs + o).to_bits()));
+        if !same {
+            return Err(Refusal::Probe { index: probe as u8 });
         }
+        bounds.check(&x, &y, envelope)?;
     }
     Ok(())
+}
+
+/// Re-runs the lane's probe: the bits must be the file's.
+#[inline(never)]
+pub(super) fn lane_probe(card: &Card<'_>, blob: &Blob<'_>, lane: &Lane<'_>) -> Result<(), Refusal> {
+    let expected = blob.floats(card.probes.lane, lane.axes().len(), "lane probe")?;
+    let found = feedback::probe(lane, 1.0 / card.timing.reference_rate_hz);
+    let same = expected.iter().zip(found).all(|(expected, found)| expected.to_bits() == found.to_bits());
+    if same { Ok(()) } else { Err(Refusal::Probe { index: u8::MAX }) }
 }

@@ -66,8 +66,36 @@ pub struct Network<'a> {
 }
 
 impl<'a> Network<'a> {
-    /// Checks shapes and sections against `inputs` features and `outputs` corrections.
-    pub(crate) fn new(layout: &NetworkLayout, blob: &Blob<'a>, inputs: usize, outputs: usize) -> Result<Self, Refusal> {
+    /// Checks shapes and sections against `inputs` features and `outputs` corrections, and makes the network in `place`. After an error
+    /// there may be a part of one.
+    pub(crate) fn load(
+        place: &mut Option<Self>,
+        layout: &NetworkLayout,
+        blob: &Blob<'a>,
+        inputs: usize,
+        outputs: usize,
+    ) -> Result<(), Refusal> {
+        let network = Self::ends(place, layout, blob, inputs, outputs)?;
+        match &mut network.layers {
+            Layers::Float(layers) => {
+                for layer in &layout.layers {
+                    let _ = layers.push(float::Layer::new(blob, layer)?);
+                }
+                Ok(())
+            }
+            Layers::Integer { layers, .. } => integer_layers(layers, layout, blob),
+        }
+    }
+
+    /// A network without its layers.
+    #[inline(never)]
+    fn ends<'p>(
+        place: &'p mut Option<Self>,
+        layout: &NetworkLayout,
+        blob: &Blob<'a>,
+        inputs: usize,
+        outputs: usize,
+    ) -> Result<&'p mut Self, Refusal> {
         if inputs > MAX_FEATURES || outputs == 0 || outputs > MAX_OUTPUTS {
             return Err(Refusal::Shape { what: "number of outputs", found: outputs as u32, limit: MAX_OUTPUTS as u32 });
         }
@@ -86,18 +114,19 @@ impl<'a> Network<'a> {
             None
         };
         let layers = match layout.arithmetic {
-            Arithmetic::Float => {
-                let mut layers = heapless::Vec::new();
-                for layer in &layout.layers {
-                    let _ = layers.push(float::Layer::new(blob, layer)?);
+            Arithmetic::Float => Layers::Float(heapless::Vec::new()),
+            Arithmetic::Int16 | Arithmetic::Int8 => {
+                if !layout.input_code.is_finite() {
+                    return Err(Refusal::NotFinite { what: "input code" });
                 }
-                Layers::Float(layers)
+                if layout.input_code <= 0.0 {
+                    return Err(Refusal::Value { what: "input code" });
+                }
+                Layers::Integer { code: layout.input_code, layers: heapless::Vec::new() }
             }
-            Arithmetic::Int16 => integer_layers(layout, blob, kernel::Width::Int16)?,
-            Arithmetic::Int8 => integer_layers(layout, blob, kernel::Width::Int8)?,
         };
         let half = scratch::half(layout, inputs);
-        Ok(Self { mean, reciprocal_scale, layers, skip, output_scale, output_mean, multiply_adds, half })
+        Ok(place.insert(Self { mean, reciprocal_scale, layers, skip, output_scale, output_mean, multiply_adds, half }))
     }
 
     /// Multiplications with a weight in one evaluation.
@@ -190,21 +219,20 @@ fn chained(layout: &NetworkLayout, inputs: usize, outputs: usize) -> Result<u32,
     Ok(multiply_adds)
 }
 
-fn integer_layers<'a>(layout: &NetworkLayout, blob: &Blob<'a>, width: kernel::Width) -> Result<Layers<'a>, Refusal> {
-    if !layout.input_code.is_finite() {
-        return Err(Refusal::NotFinite { what: "input code" });
-    }
-    if layout.input_code <= 0.0 {
-        return Err(Refusal::Value { what: "input code" });
-    }
-    let mut layers = heapless::Vec::new();
+#[inline(never)]
+fn integer_layers<'a>(
+    layers: &mut heapless::Vec<integer::Layer<'a>, MAX_LAYERS>,
+    layout: &NetworkLayout,
+    blob: &Blob<'a>,
+) -> Result<(), Refusal> {
+    let width = if layout.arithmetic == Arithmetic::Int16 { kernel::Width::Int16 } else { kernel::Width::Int8 };
     let mut before = Activation::Linear;
     for (index, layer) in layout.layers.iter().enumerate() {
         let next = layout.layers.get(index + 1);
         let _ = layers.push(integer::Layer::new(blob, width, layer, index as u8, before, next)?);
         before = layer.activation;
     }
-    Ok(Layers::Integer { code: layout.input_code, layers })
+    Ok(())
 }
 
 /// Rows of a packed layer: outputs rounded up to whole blocks.

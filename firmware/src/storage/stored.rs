@@ -4,7 +4,10 @@
 //! a slot as spare that holds the model to be flown; *source* sequence numbers and check sums of [`Header`].
 
 use super::{HEADER, Header, Sequence, StorageError};
-use crate::model::{Model, Refusal, file};
+use crate::{
+    model::{Model, Refusal, file},
+    network::Scratch,
+};
 
 /// An intact model in its slot: header and check sums hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,13 +90,17 @@ pub struct Survey<'a> {
 
 /// Whether a file is a model that flies here.
 #[inline(never)]
-pub(super) fn examine(file: &[u8], check: impl FnOnce(&Model<'_>) -> Result<(), Refusal>) -> Result<(), Refusal> {
+pub(super) fn examine(
+    file: &[u8],
+    scratch: &mut Scratch,
+    check: impl FnOnce(&Model<'_>) -> Result<(), Refusal>,
+) -> Result<(), Refusal> {
     let mut place = Model::VACANT;
-    check(Model::load_into(&mut place, file)?)
+    check(Model::load_into(&mut place, file, scratch)?)
 }
 
-/// Looks at both slots; `check` says whether a model fits the application (signals, rate, preview).
-pub fn survey<'a>(slots: [&'a [u8]; 2], check: impl Fn(&Model<'_>) -> Result<(), Refusal>) -> Survey<'a> {
+/// Looks at both slots; `check` says whether a model fits the application (signals, rate, preview). The scratch is for the probes.
+pub fn survey<'a>(slots: [&'a [u8]; 2], scratch: &mut Scratch, check: impl Fn(&Model<'_>) -> Result<(), Refusal>) -> Survey<'a> {
     let [first, second] = slots.map(|slot| Stored::read(slot).ok());
     let newest_first = match (first, second) {
         (Some(a), Some(b)) if b.sequence.is_newer_than(a.sequence) => [(Place::Second, second), (Place::First, first)],
@@ -101,7 +108,7 @@ pub fn survey<'a>(slots: [&'a [u8]; 2], check: impl Fn(&Model<'_>) -> Result<(),
     };
     let intact = newest_first.into_iter().filter_map(|(place, stored)| Some((place, stored?)));
     let newest = intact.clone().next();
-    let flies = intact.clone().find(|(_, stored)| examine(stored.file, &check).is_ok());
+    let flies = intact.clone().find(|(_, stored)| examine(stored.file, scratch, &check).is_ok());
     Survey {
         flies: flies.map(|(_, stored)| stored),
         spare: flies.or(newest).map_or(Place::First, |(place, _)| place.other()),

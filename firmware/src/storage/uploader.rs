@@ -4,7 +4,10 @@
 //! while armed, nor a header before a model that this machine would fly; *source* the two-slot update with a commit record written last.
 
 use super::{HEADER, Header, Operation, Sequence, Slot, StorageError, Stored, stored::examine};
-use crate::model::{Model, Refusal, file};
+use crate::{
+    model::{Model, Refusal, file},
+    network::Scratch,
+};
 
 /// Bytes that are collected for one write to the flash: a multiple of every driver's granularity.
 const BLOCK: usize = HEADER;
@@ -107,7 +110,7 @@ impl<S: Slot> Uploader<S> {
     }
 
     /// Checks what the flash now holds and makes it the newest model: complete, the announced check sum, [`Model::from_bytes`] with its
-    /// probes on this machine, and `check` (signals, rate, preview of the application). Only then the header is written, and read back.
+    /// probes on this machine in `scratch`, and `check` (signals, rate, preview of the application). Only then the header is written, and read back.
     ///
     /// The model flies from the next [`super::open`] on.
     ///
@@ -116,6 +119,7 @@ impl<S: Slot> Uploader<S> {
     pub fn commit(
         &mut self,
         arming: Arming,
+        scratch: &mut Scratch,
         check: impl FnOnce(&Model<'_>) -> Result<(), Refusal>,
     ) -> Result<Stored<'_>, StorageError> {
         arming.permit()?;
@@ -129,7 +133,7 @@ impl<S: Slot> Uploader<S> {
                 if !(received as usize).is_multiple_of(BLOCK) {
                     self.program(received)?;
                 }
-                self.finish(length, checksum, check)?;
+                self.finish(length, checksum, scratch, check)?;
                 self.state = State::Committed;
             }
             State::Committed => {}
@@ -150,6 +154,7 @@ impl<S: Slot> Uploader<S> {
         &mut self,
         length: u32,
         announced: u32,
+        scratch: &mut Scratch,
         check: impl FnOnce(&Model<'_>) -> Result<(), Refusal>,
     ) -> Result<(), StorageError> {
         let slot = self.slot.bytes();
@@ -158,7 +163,7 @@ impl<S: Slot> Uploader<S> {
         if computed != announced {
             return Err(StorageError::Checksum { announced, computed });
         }
-        examine(file, check)?;
+        examine(file, scratch, check)?;
         let header = Header { sequence: self.sequence, length, checksum: announced }.to_bytes();
         self.slot.write(0, &header).map_err(|error| StorageError::flash(Operation::WriteHeader, &error))?;
         if self.slot.bytes().starts_with(&header) { Ok(()) } else { Err(StorageError::ReadBack) }

@@ -2,7 +2,10 @@
 
 use std::{cell::RefCell, rc::Rc};
 
-use impromptu_firmware::storage::{self, Arming, Header, Sequence, Slot, StorageError, Uploader};
+use impromptu_firmware::{
+    network::Scratch,
+    storage::{self, Arming, Header, Sequence, Slot, StorageError, Uploader},
+};
 use proptest::prelude::*;
 
 use crate::{
@@ -19,12 +22,12 @@ fn update<S: Slot>(uploader: &mut Uploader<S>, file: &[u8]) -> Result<(), Storag
     for chunk in file.chunks(53) {
         next = uploader.write(Arming::Disarmed, next, chunk)?;
     }
-    uploader.commit(Arming::Disarmed, anything).map(|stored| assert_eq!(stored.file(), file))
+    uploader.commit(Arming::Disarmed, &mut Scratch::new(), anything).map(|stored| assert_eq!(stored.file(), file))
 }
 
 /// The model that a start finds.
 fn boot<const WRITE: usize, const ERASE: usize>(slots: &Slots<WRITE, ERASE>) -> Option<Vec<u8>> {
-    storage::survey(slots.each_ref().map(Slot::bytes), anything).flies.map(|stored| stored.file().to_vec())
+    storage::survey(slots.each_ref().map(Slot::bytes), &mut Scratch::new(), anything).flies.map(|stored| stored.file().to_vec())
 }
 
 /// Slots which hold these models, the number of the first being `sequence`, in turn from slot `first` on.
@@ -118,7 +121,7 @@ fn an_error_of_the_driver_at_any_call_is_reported_and_loses_nothing() {
         }
         assert!(matches!(result, Err(StorageError::Flash { .. })), "{result:?}");
         assert_eq!(uploader.write(Arming::Disarmed, 0, &third), Err(StorageError::NotBegun));
-        assert_eq!(uploader.commit(Arming::Disarmed, anything), Err(StorageError::NotBegun));
+        assert_eq!(uploader.commit(Arming::Disarmed, &mut Scratch::new(), anything), Err(StorageError::NotBegun));
         assert_eq!(update(&mut uploader, &third), Ok(()), "the same uploader, after call {call} failed");
         assert_eq!(boot(&slots).as_deref(), Some(&*third));
     }

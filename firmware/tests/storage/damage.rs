@@ -2,6 +2,7 @@
 
 use impromptu_firmware::{
     model::{Model, Refusal},
+    network::Scratch,
     storage::{HEADER, Header, Place, Sequence, Slot, StorageError, Stored, survey},
 };
 
@@ -29,12 +30,12 @@ fn every_flipped_bit_is_found_and_the_other_model_flies() {
         newer.flip(bit);
         assert!(Stored::read(newer.bytes()).is_err(), "bit {bit}");
         for (slots, spare) in [([&older, &newer], Place::Second), ([&newer, &older], Place::First)] {
-            let found = survey(slots.map(Slot::bytes), anything);
+            let found = survey(slots.map(Slot::bytes), &mut Scratch::new(), anything);
             assert_eq!((found.flies.unwrap().file(), found.spare, found.sequence), (INTEGER, spare, Sequence(2)), "bit {bit}");
         }
         newer.flip(bit);
     }
-    assert_eq!(survey([older.bytes(), newer.bytes()], anything).flies.unwrap().file(), FLOAT);
+    assert_eq!(survey([older.bytes(), newer.bytes()], &mut Scratch::new(), anything).flies.unwrap().file(), FLOAT);
 }
 
 #[test]
@@ -51,7 +52,7 @@ fn the_newest_model_flies_also_after_the_last_number() {
     for number in [0, 7, i32::MAX as u32, u32::MAX] {
         let (older, newer) = (slot(number, FLOAT), slot(number.wrapping_add(1), INTEGER));
         for (slots, spare) in [([&older, &newer], Place::First), ([&newer, &older], Place::Second)] {
-            let found = survey(slots.map(Slot::bytes), anything);
+            let found = survey(slots.map(Slot::bytes), &mut Scratch::new(), anything);
             let expected = (INTEGER, spare, Sequence(number.wrapping_add(2)));
             assert_eq!((found.flies.unwrap().file(), found.spare, found.sequence), expected);
         }
@@ -64,7 +65,7 @@ fn a_newer_model_that_does_not_fly_here_is_passed_over() {
     let unwanted = |model: &Model<'_>| if model.card().name == "third" { Err(Refusal::Card) } else { cart(model) };
     for bad in [with_wrong_probe(), named(b"third")] {
         let bad = slot(2, &bad);
-        let found = survey([good.bytes(), bad.bytes()], unwanted);
+        let found = survey([good.bytes(), bad.bytes()], &mut Scratch::new(), unwanted);
         assert_eq!((found.flies.unwrap().file(), found.spare, found.sequence), (FLOAT, Place::Second, Sequence(3)));
     }
 }
@@ -72,10 +73,10 @@ fn a_newer_model_that_does_not_fly_here_is_passed_over() {
 #[test]
 fn where_nothing_flies_the_newest_intact_model_is_kept() {
     let slots = [slot(5, FLOAT), slot(4, INTEGER)];
-    let found = survey(slots.each_ref().map(Slot::bytes), quadrotor);
+    let found = survey(slots.each_ref().map(Slot::bytes), &mut Scratch::new(), quadrotor);
     assert_eq!((found.flies, found.spare, found.sequence), (None, Place::Second, Sequence(6)));
     let slots = [Flash::new(&Supply::new()), slot(4, INTEGER)];
-    let found = survey(slots.each_ref().map(Slot::bytes), quadrotor);
+    let found = survey(slots.each_ref().map(Slot::bytes), &mut Scratch::new(), quadrotor);
     assert_eq!((found.flies, found.spare, found.sequence), (None, Place::First, Sequence(5)));
 }
 

@@ -2,6 +2,7 @@
 
 use impromptu_firmware::{
     model::{Model, Refusal, file},
+    network::Scratch,
     storage::{Arming, RamFlash, Slot, StorageError, Uploader, open},
 };
 use proptest::prelude::*;
@@ -22,7 +23,7 @@ fn with_a_model() -> [Flash; 2] {
     let mut slots = [Flash::new(), Flash::new()];
     let mut uploader = open(&mut slots, anything).1;
     send(&mut uploader, FLOAT).unwrap();
-    uploader.commit(DISARMED, cart).unwrap();
+    uploader.commit(DISARMED, &mut Scratch::new(), cart).unwrap();
     slots
 }
 
@@ -40,11 +41,15 @@ fn a_refused_model_never_displaces_the_good_one() {
         let (stored, mut uploader) = open(&mut slots, cart);
         assert_eq!(stored.unwrap().file(), FLOAT);
         send(&mut uploader, bad).unwrap();
-        match uploader.commit(DISARMED, check) {
+        match uploader.commit(DISARMED, &mut Scratch::new(), check) {
             Err(StorageError::Refused(refusal)) => refusals.push(refusal),
             other => panic!("{other:?}"),
         }
-        assert_eq!(uploader.commit(DISARMED, anything), Err(StorageError::NotBegun), "a refused model cannot be committed again");
+        assert_eq!(
+            uploader.commit(DISARMED, &mut Scratch::new(), anything),
+            Err(StorageError::NotBegun),
+            "a refused model cannot be committed again"
+        );
     }
     assert!(
         matches!(
@@ -70,7 +75,7 @@ fn bytes_other_than_announced_are_refused() {
     uploader.begin(DISARMED, FLOAT.len() as u32, announced).unwrap();
     uploader.write(DISARMED, 0, FLOAT).unwrap();
     let computed = file::checksum(FLOAT);
-    assert_eq!(uploader.commit(DISARMED, anything), Err(StorageError::Checksum { announced, computed }));
+    assert_eq!(uploader.commit(DISARMED, &mut Scratch::new(), anything), Err(StorageError::Checksum { announced, computed }));
 }
 
 #[test]
@@ -85,8 +90,8 @@ fn nothing_is_written_while_armed() {
     uploader.begin(DISARMED, INTEGER.len() as u32, file::checksum(INTEGER)).unwrap();
     assert_eq!(uploader.write(Arming::Armed, 0, INTEGER), Err(StorageError::Armed));
     assert_eq!(uploader.write(DISARMED, 0, INTEGER), Ok(INTEGER.len() as u32), "disarmed again, the upload goes on");
-    assert_eq!(uploader.commit(Arming::Armed, anything), Err(StorageError::Armed));
-    assert_eq!(uploader.commit(DISARMED, anything).unwrap().file(), INTEGER);
+    assert_eq!(uploader.commit(Arming::Armed, &mut Scratch::new(), anything), Err(StorageError::Armed));
+    assert_eq!(uploader.commit(DISARMED, &mut Scratch::new(), anything).unwrap().file(), INTEGER);
 }
 
 #[test]
@@ -101,10 +106,10 @@ fn gaps_overruns_and_early_commits_name_what_is_expected_and_the_upload_goes_on(
     assert_eq!(uploader.write(DISARMED, 1, &INTEGER[1..]), Err(StorageError::Gap { expected: 0, found: 1 }));
     assert_eq!(uploader.write(DISARMED, 0, &INTEGER[..100]), Ok(100));
     assert_eq!(uploader.write(DISARMED, 0, FLOAT), Err(StorageError::Overrun { end: FLOAT.len() as u64, length }));
-    assert_eq!(uploader.commit(DISARMED, anything), Err(StorageError::Incomplete { received: 100, length }));
+    assert_eq!(uploader.commit(DISARMED, &mut Scratch::new(), anything), Err(StorageError::Incomplete { received: 100, length }));
     assert_eq!(uploader.begin(DISARMED, length, file::checksum(INTEGER)), Ok(100), "a repeated announcement goes on");
     assert_eq!(uploader.write(DISARMED, 100, &INTEGER[100..]), Ok(length));
-    assert_eq!(uploader.commit(DISARMED, anything).unwrap().file(), INTEGER);
+    assert_eq!(uploader.commit(DISARMED, &mut Scratch::new(), anything).unwrap().file(), INTEGER);
 }
 
 #[test]
@@ -112,14 +117,14 @@ fn a_repeated_commit_is_acknowledged_and_another_upload_waits_for_a_restart() {
     let mut slots = with_a_model();
     let (_, mut uploader) = open(&mut slots, anything);
     send(&mut uploader, INTEGER).unwrap();
-    let first = uploader.commit(DISARMED, anything).unwrap().sequence();
-    assert_eq!(uploader.commit(DISARMED, quadrotor).unwrap().sequence(), first);
+    let first = uploader.commit(DISARMED, &mut Scratch::new(), anything).unwrap().sequence();
+    assert_eq!(uploader.commit(DISARMED, &mut Scratch::new(), quadrotor).unwrap().sequence(), first);
     assert_eq!(send(&mut uploader, FLOAT), Err(StorageError::Restart));
     let third = named(b"third");
     let (stored, mut uploader) = open(&mut slots, anything);
     assert_eq!(stored.unwrap().file(), INTEGER);
     send(&mut uploader, &third).unwrap();
-    assert_eq!(uploader.commit(DISARMED, anything).unwrap().name(), "third");
+    assert_eq!(uploader.commit(DISARMED, &mut Scratch::new(), anything).unwrap().name(), "third");
 }
 
 proptest! {
@@ -148,6 +153,6 @@ proptest! {
             }
         }
         uploader.write(DISARMED, next, &INTEGER[next as usize..]).unwrap();
-        prop_assert_eq!(uploader.commit(DISARMED, anything).unwrap().file(), INTEGER);
+        prop_assert_eq!(uploader.commit(DISARMED, &mut Scratch::new(), anything).unwrap().file(), INTEGER);
     }
 }

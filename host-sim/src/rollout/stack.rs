@@ -104,6 +104,6 @@ impl FlightStack for Software<'_> {
     }
 
     fn trips(&mut self) -> Trips {
-        self.flight.adapter().map(|adapter| adapter.guard().trips()).unwrap_or_default()
+        self.flight.adapter().map(|adapter| adapter.trips()).unwrap_or_default()
     }
 }

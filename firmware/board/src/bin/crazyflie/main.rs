@@ -29,9 +29,9 @@ mod safety;
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
 mod app {
     use cortex_m::peripheral::SCB;
-    use impromptu_board::{Cost as _, LINK_BAUD, Start, Tasks, slots::slots, start};
+    use impromptu_board::{CONTROL_HZ, Cost as _, LINK_BAUD, Start, Tasks, slots::slots, start};
     use impromptu_firmware::{
-        application::Application,
+        application::{Application, OUTBOX},
         autopilot::Meters,
         exchange::ByteRing,
         network::{Network, Scratch},
@@ -54,11 +54,17 @@ mod app {
 
     static TASKS: Tasks = Tasks::new();
     /// Bytes from and to the line.
-    static RECEIVED: ByteRing<1024> = ByteRing::new();
-    static SENDING: ByteRing<1024> = ByteRing::new();
+    static RECEIVED: ByteRing<512> = ByteRing::new();
+    static SENDING: ByteRing<512> = ByteRing::new();
+    const _: () = assert!(OUTBOX <= 512, "what a tick says fits into the line's queue");
+    const _: () = assert!(2 * LINK_BAUD / 10 / CONTROL_HZ <= 512, "and what arrives in two ticks");
 
     #[shared]
-    struct Shared {}
+    struct Shared {
+        /// Of tasks of one priority.
+        #[lock_free]
+        scratch: &'static mut Scratch,
+    }
 
     #[local]
     struct Local {
@@ -70,7 +76,6 @@ mod app {
         /// A piece came in the last tick.
         piece: bool,
         network: Option<&'static Network<'static>>,
-        scratch: Scratch,
         uploader: Uploader<Sector>,
         receiver: Rx<USART3>,
         transmitter: Tx<USART3>,
@@ -85,7 +90,7 @@ mod app {
         let motors = Motors::new((device.TIM2, device.TIM4), (a.pa1, b.pb11, a.pa15, b.pb9), &mut rcc);
 
         instruments::paint_stack();
-        let Some(Start { application, network, spare, sequence }) = start(slots()) else { SCB::sys_reset() };
+        let Some(Start { application, network, spare, sequence, scratch }) = start(slots()) else { SCB::sys_reset() };
         let uploader = Uploader::new(Sector::new(device.FLASH, spare), sequence);
 
         let baud = Line::default().baudrate(LINK_BAUD.bps());
@@ -103,12 +108,11 @@ mod app {
             restart: Restart::default(),
             piece: false,
             network,
-            scratch: Scratch::new(),
             uploader,
             receiver,
             transmitter,
         };
-        (Shared {}, local)
+        (Shared { scratch }, local)
     }
 
     #[idle]
@@ -132,10 +136,13 @@ mod app {
         }
         let (came, heard) = Cycles.measure(|| {
             let mut came = false;
-            while let Some(byte) = RECEIVED.take() {
-                came |= TASKS.hear(application, &[byte]);
+            let mut bytes = [0; 32];
+            loop {
+                match RECEIVED.take_some(&mut bytes) {
+                    [] => break came,
+                    bytes => came |= TASKS.hear(application, bytes),
+                }
             }
-            came
         });
         *piece = came;
         let tick = TASKS.fly(application, meters, &Cycles, heard);
@@ -153,14 +160,14 @@ mod app {
         watchdog.feed(application.autopilot().armed());
     }
 
-    #[task(binds = DCMI, priority = 1, local = [network, scratch])]
+    #[task(binds = DCMI, priority = 1, local = [network], shared = [scratch])]
     fn inference(cx: inference::Context) {
-        TASKS.infer(*cx.local.network, cx.local.scratch, &Cycles);
+        TASKS.infer(*cx.local.network, cx.shared.scratch, &Cycles);
     }
 
-    #[task(binds = CRYP, priority = 1, local = [uploader])]
+    #[task(binds = CRYP, priority = 1, local = [uploader], shared = [scratch])]
     fn storage(cx: storage::Context) {
-        TASKS.store(cx.local.uploader);
+        TASKS.store(cx.local.uploader, cx.shared.scratch);
     }
 
     #[task(binds = USART3, priority = 4, local = [receiver, transmitter])]

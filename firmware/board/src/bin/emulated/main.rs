@@ -47,6 +47,9 @@ mod app {
 
     #[shared]
     struct Shared {
+        /// Of tasks of one priority.
+        #[lock_free]
+        scratch: &'static mut Scratch,
         serial: USART1,
     }
 
@@ -57,7 +60,6 @@ mod app {
         meters: Meters,
         counter: Counter<TIM2>,
         network: Option<&'static Network<'static>>,
-        scratch: Scratch,
         inference_counter: Counter<TIM5>,
         uploader: Uploader<FileSlot>,
     }
@@ -65,7 +67,9 @@ mod app {
     #[init]
     fn init(cx: init::Context) -> (Shared, Local) {
         instruments::paint_stack();
-        let Some(Start { application, network, spare, sequence }) = start(slots()) else { semihosting::process::exit(1) };
+        let Some(Start { application, network, spare, sequence, scratch }) = start(slots()) else {
+            semihosting::process::exit(1)
+        };
         let uploader = Uploader::new(FileSlot::new(spare), sequence);
         let lockstep = Lockstep::open();
         let counter = Counter::new(cx.device.TIM2);
@@ -76,9 +80,8 @@ mod app {
             port::start_serial(&cx.device.USART1);
         }
         let meters = Meters::default();
-        let local =
-            Local { application, lockstep, meters, counter, network, scratch: Scratch::new(), inference_counter, uploader };
-        (Shared { serial: cx.device.USART1 }, local)
+        let local = Local { application, lockstep, meters, counter, network, inference_counter, uploader };
+        (Shared { scratch, serial: cx.device.USART1 }, local)
     }
 
     #[idle]
@@ -118,8 +121,12 @@ mod app {
                 true
             }
             None => {
-                while let Some(byte) = RECEIVED.take() {
-                    hear(&[byte]);
+                let mut bytes = [0; 32];
+                loop {
+                    match RECEIVED.take_some(&mut bytes) {
+                        [] => break,
+                        bytes => hear(bytes),
+                    }
                 }
                 // An upload comes without news of the attitude.
                 application.informed() || !application.autopilot().armed()
@@ -139,14 +146,14 @@ mod app {
         application.sent();
     }
 
-    #[task(binds = DCMI, priority = 1, local = [network, scratch, inference_counter])]
+    #[task(binds = DCMI, priority = 1, local = [network, inference_counter], shared = [scratch])]
     fn inference(cx: inference::Context) {
-        TASKS.infer(*cx.local.network, cx.local.scratch, cx.local.inference_counter);
+        TASKS.infer(*cx.local.network, cx.shared.scratch, cx.local.inference_counter);
     }
 
-    #[task(binds = CRYP, priority = 1, local = [uploader])]
+    #[task(binds = CRYP, priority = 1, local = [uploader], shared = [scratch])]
     fn storage(cx: storage::Context) {
-        TASKS.store(cx.local.uploader);
+        TASKS.store(cx.local.uploader, cx.shared.scratch);
         // Over the serial port there is a control tick only when something is heard: the outcome is to be told.
         SCB::set_pendst();
     }
