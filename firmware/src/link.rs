@@ -36,7 +36,7 @@ pub use counts::{Counts, Fault};
 pub use message::{Command, Commands, Direction, Report, Reports};
 pub use outcome::{ModelFault, Outcome, Reason};
 pub use port::{SendError, receive, send};
-pub use receiver::{Order, Received, Receiver};
+pub use receiver::{Order, RECENT, Received, Receiver};
 pub use sender::{Sender, encode};
 
 /// Version of the protocol that this build speaks.

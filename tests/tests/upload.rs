@@ -17,7 +17,7 @@ use impromptu_host_sim::{
 use impromptu_model_export::Precision;
 use impromptu_tests::emulator::{BOARD, build_firmware};
 
-use crate::board::model;
+use crate::{board::model, image};
 
 fn plant() -> Loop {
     Loop::new(Vehicle::named("crazyflie").unwrap(), "stock", Condition::named("lab").unwrap()).unwrap()
@@ -61,6 +61,11 @@ fn an_uploaded_model_flies_after_the_restart_and_never_before() {
     assert_eq!(reason(board.upload(&old)), Reason::Armed);
     board.prepare(&plant.settings, None).unwrap();
     board.upload(&old).unwrap();
+    // The board looks at its stack once in a thousand ticks: by now at that of a start, a flight and an upload.
+    (0..2_100).for_each(|_| assert_eq!(board.introduce().unwrap(), Some(second.checksum())));
+    let (measured, bound) = (board.telemetry().stack_bytes, image::emulated_stack());
+    println!("stack: {measured} bytes of at most {bound}");
+    assert!((bound / 2..=bound).contains(&measured), "{measured} bytes of at most {bound}");
     let (_emulated, mut board) = pil::restart(emulated).unwrap();
     assert_eq!(board.introduce().unwrap(), Some(first.checksum()));
     flies(&mut board, &plant, &first);

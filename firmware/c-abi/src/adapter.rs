@@ -5,7 +5,7 @@
 
 use impromptu_firmware::{
     adapter::{Adapter, Inference, Job, Lanes},
-    model::SignalTable,
+    model,
     network::Scratch,
     preview::{EndRule, Preview},
 };
@@ -35,17 +35,18 @@ pub(crate) struct Layout {
 
 impl Layout {
     /// Of the application's table.
-    pub(crate) fn new(table: &SignalTable<'_>) -> Self {
+    pub(crate) fn new(table: &model::Channels<'_>) -> Self {
         let mut rules = [EndRule::Hold; MAX_CHANNELS];
-        for (rule, channel) in rules.iter_mut().zip(&table.desired) {
+        for (rule, channel) in rules.iter_mut().zip(table.desired) {
             *rule = channel.end;
         }
         Self { rules, counts: [table.desired.len(), table.measured.len(), table.reference.len()] }
     }
 }
 
-/// A preview without a sample: all zeros, so that it is written in place.
+/// A preview without a sample, and an adapter without a model: all zeros, so that they are written in place.
 pub(crate) const EMPTY: Preview<MAX_CHANNELS, PREVIEW> = Preview::new([EndRule::Hold; MAX_CHANNELS], 0);
+pub(crate) const PARKED: Adapter<'static, MAX_CHANNELS, MAX_CHANNELS, MAX_CHANNELS> = Adapter::parked();
 
 impl Stage {
     /// Whether these are the counts of desired, measured and reference channels; `None` is not asked.

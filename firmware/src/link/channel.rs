@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use super::{
-    CHUNK, Command, Commands, Counts, Direction, FRAME, Fault, Order, Reason, Receiver, Reports, Sender, encode, frozen,
+    CHUNK, Command, Commands, Counts, Direction, FRAME, Fault, Order, RECENT, Reason, Receiver, Reports, Sender, encode, frozen,
     message::{Inertial, ModelChunk, Position, TimedSetpoint},
     sender::seal,
 };
@@ -169,6 +169,32 @@ fn frames_that_come_late_or_twice_are_marked_and_counted() {
     });
     assert_eq!(counts, Counts { received: 1100, reordered: 200, dropped: 100, ..Counts::default() });
     assert!(matches!(&outcomes[3..6], [Ok((4, Order::Gap { missing: 1 }, _)), Ok((3, Order::Late, _)), Ok((5, Order::Next, _))]));
+}
+
+#[test]
+fn after_any_number_of_lost_frames_commands_are_understood_again_within_few() {
+    let order = |lost: u32, after: u32| {
+        let (mut sender, mut receiver, mut last) = (Sender::new(), Receiver::<Commands>::new(), Vec::new());
+        for index in 0..=lost + after {
+            let bytes = sender.encode(&Command::Arm, &mut [0; FRAME]).unwrap().1.to_vec();
+            if index == 0 || index > lost {
+                last = feed(&mut receiver, &bytes);
+            }
+        }
+        last.remove(0).unwrap().1
+    };
+    for lost in 0..600 {
+        let first = order(lost, 1);
+        // As far as one byte tells: the number may be one of the last.
+        let recent = (lost + 1) % 256 > 255 - u32::from(RECENT) + 1 || (lost + 1) % 256 == 0;
+        assert_eq!(first == Order::Late, recent, "{lost} lost: {first:?}");
+        assert_ne!(order(lost, u32::from(RECENT) + 1), Order::Late, "{lost} lost");
+    }
+    // As long ago as can be, still a copy.
+    let mut receiver = Receiver::<Commands>::new();
+    let sent: Vec<u8> = (0..RECENT).flat_map(|sequence| frame(&Command::Arm, sequence)).collect();
+    feed(&mut receiver, &sent);
+    assert!(matches!(feed(&mut receiver, &frame(&Command::Arm, 0))[..], [Ok((0, Order::Late, _))]));
 }
 
 #[test]

@@ -21,9 +21,13 @@ pub enum Order {
         /// Frames between them.
         missing: u8,
     },
-    /// Not younger than the youngest: a copy, or overtaken. What it says may be out of date.
+    /// One of the last [`RECENT`]: a copy, or overtaken. What it says may be out of date.
     Late,
 }
+
+/// So far behind the youngest a frame is late; 64 ms of a flight at 500 Hz. All other numbers are ahead: after any silence the line is
+/// understood again from the next frame on, or, if what was lost comes within these many of a multiple of 256, that much later.
+pub const RECENT: u8 = 32;
 
 /// A message that arrived as it was sent.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -164,11 +168,10 @@ fn read<D: Direction>(bytes: &[u8]) -> Result<D::Message<'_>, Reason> {
 }
 
 fn place(youngest: &mut Option<u8>, sequence: u8) -> Order {
-    // Half of the numbers are ahead, the other half behind.
     let order = match youngest.map(|youngest| sequence.wrapping_sub(youngest)) {
         None => Order::First,
         Some(1) => Order::Next,
-        Some(ahead @ 2..=127) => Order::Gap { missing: ahead - 1 },
+        Some(ahead) if ahead > 1 && ahead <= u8::MAX - (RECENT - 1) => Order::Gap { missing: ahead - 1 },
         Some(_) => return Order::Late,
     };
     *youngest = Some(sequence);

@@ -152,9 +152,18 @@ impl<'a> CallGraph<'a> {
     /// # Errors
     /// If one of them has no bound ([`Proof::stack_bytes`]).
     pub fn nested_stack_bytes(&self, thread: &[&str], levels: &[&[&str]]) -> Result<u32> {
-        let mut bytes = self.from_roots(thread)?.stack_bytes()?;
+        self.nested_stack_bytes_except(thread, levels, &[])
+    }
+
+    /// [`CallGraph::nested_stack_bytes`] without what is called by the functions with `exceptions` in their names, which have no stack then: those
+    /// that end the program, or have ended before the interrupts are on.
+    ///
+    /// # Errors
+    /// If one of them has no bound, or an exception is not there.
+    pub fn nested_stack_bytes_except(&self, thread: &[&str], levels: &[&[&str]], exceptions: &[&str]) -> Result<u32> {
+        let mut bytes = self.from_roots_except(thread, exceptions)?.stack_bytes()?;
         for handlers in levels {
-            bytes += EXCEPTION_FRAME + self.from_roots(handlers)?.stack_bytes()?;
+            bytes += EXCEPTION_FRAME + self.from_roots_except(handlers, exceptions)?.stack_bytes()?;
         }
         Ok(bytes)
     }

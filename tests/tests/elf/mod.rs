@@ -22,7 +22,8 @@ const TICK: &str = "netduinoplus2::replay::step";
 /// The kernels in assembly that jump to their own labels by address.
 const LABELLED: [&str; 4] = ["cortex_m4::float_kernel", "cortex_m4::float_six_kernel", "cortex_m4::int8", "cortex_m4::int16"];
 
-fn read(elf: &Path) -> Elf {
+/// A binary whose kernels can be followed.
+pub(crate) fn read(elf: &Path) -> Elf {
     let mut image = Elf::read(elf).unwrap();
     LABELLED.iter().for_each(|name| image.declare_labels(name).unwrap());
     image

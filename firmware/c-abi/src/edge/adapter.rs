@@ -4,17 +4,17 @@ use core::{ffi::c_int, ptr};
 
 use impromptu_firmware::{
     adapter::{Adapter, Lanes},
-    model::{Model, SignalTable},
+    model::{Channels, Model},
     network::Scratch,
     quadrotor,
 };
 
 use super::{Place, channels, create, input, object, report, signals::table, view};
 use crate::{
-    adapter::{EMPTY, Layout, Stage},
+    adapter::{EMPTY, Layout, PARKED, Stage},
     memory::{AdapterMemory, ModelMemory, Object, ScratchMemory},
     status::Status,
-    values::{Inference, Job, PREVIEW, Report, Signals},
+    values::{Inference, Job, MAX_CHANNELS, PREVIEW, Report, Signals},
 };
 
 /// Creates an adapter in `adapter`, which has `size` bytes, for a loop whose references run at `rate_hz`. Both lanes are off.
@@ -35,8 +35,8 @@ pub unsafe extern "C" fn impromptu_adapter_create(
         create(adapter, size, |stage| {
             let model = view::<Model<'static>>(model)?;
             match signals.is_null() {
-                true => fill(stage, model, &model.card().signals, rate_hz, first_tick),
-                false => fill(stage, model, &table(signals)?, rate_hz, first_tick),
+                true => fill(stage, model, &(&model.card().signals).into(), rate_hz, first_tick),
+                false => fill(stage, model, &(&table(signals)?).into(), rate_hz, first_tick),
             }
         })
     }
@@ -64,18 +64,17 @@ pub unsafe extern "C" fn impromptu_adapter_create_quadrotor(
 unsafe fn fill(
     stage: *mut Stage,
     model: &'static Model<'static>,
-    table: &SignalTable<'_>,
+    table: &Channels<'_>,
     rate_hz: f32,
     first_tick: i32,
 ) -> Result<(), Status> {
+    Adapter::<MAX_CHANNELS, MAX_CHANNELS, MAX_CHANNELS>::check(model, table, rate_hz, PREVIEW)?;
     let layout = Layout::new(table);
     // SAFETY: memory for an adapter that nobody else uses; all of its fields are written.
     unsafe {
-        // No `?`: it would put another copy on the stack.
-        match Adapter::new(model, table, rate_hz, PREVIEW) {
-            Ok(adapter) => ptr::addr_of_mut!((*stage).adapter).write(adapter),
-            Err(refusal) => return Err(refusal.into()),
-        }
+        let adapter = ptr::addr_of_mut!((*stage).adapter);
+        adapter.write(PARKED);
+        (*adapter).tie(model, table);
         let preview = ptr::addr_of_mut!((*stage).preview);
         preview.write(EMPTY);
         (*preview).restart(layout.rules, first_tick);

@@ -12,8 +12,11 @@ use crate::{
     values::{Command, FlightSettings, Inference, Job, Report, Setpoint, State},
 };
 
+/// All zeros, so that it is written in place.
+const PARKED: Flight<'static> = Flight::parked();
+
 /// Creates a flight stack in `flight`, which has `size` bytes, with no add-on. The first setpoint is that of reference tick 0.
-/// Needs up to 32 KB of stack.
+/// Needs up to 4 KB of stack.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_flight_create(
     flight: *mut FlightMemory,
@@ -25,11 +28,9 @@ pub unsafe extern "C" fn impromptu_flight_create(
         create::<Stack>(flight, size, |stack| {
             let settings = input(settings)?.checked().ok_or(Status::Settings)?;
             ptr::addr_of_mut!((*stack).settings).write(settings);
-            match Flight::new(&settings) {
-                Some(flight) => ptr::addr_of_mut!((*stack).flight).write(flight),
-                None => return Err(Status::Settings),
-            }
-            Ok(())
+            let flight = ptr::addr_of_mut!((*stack).flight);
+            flight.write(PARKED);
+            if (*flight).configure(&settings) { Ok(()) } else { Err(Status::Settings) }
         })
     }
 }

@@ -21,7 +21,7 @@ pub extern "C" fn impromptu_status_text(status: i32) -> *const c_char {
 /// Checks a model file of `length` bytes and creates the model in `model`, which has `size` bytes (sizeof *model).
 ///
 /// The bytes stay where they are, in flash for instance: they must live and keep unchanged as long as the model. They should start at a multiple of
-/// 16 bytes; elsewhere they are read by slower kernels, with the same results. Needs up to 16 KB of stack on a microcontroller; what is not said to need more, 2 KB.
+/// 16 bytes; elsewhere they are read by slower kernels, with the same results. Needs up to 8 KB of stack on a microcontroller; what is not said to need more, 2 KB.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_model_create(model: *mut ModelMemory, size: usize, bytes: *const u8, length: usize) -> Status {
     let bytes = match checked(bytes) {
@@ -32,10 +32,8 @@ pub unsafe extern "C" fn impromptu_model_create(model: *mut ModelMemory, size: u
     // SAFETY: the module's rules.
     unsafe {
         create::<Model<'static>>(model, size, |place| {
-            match Model::from_bytes(bytes) {
-                Ok(model) => place.write(model),
-                Err(refusal) => return Err(refusal.into()),
-            }
+            place.write(Model::VACANT);
+            Model::load_into(&mut *place, bytes, &mut Scratch::new())?;
             Ok(())
         })
     }
