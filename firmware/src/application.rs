@@ -20,7 +20,7 @@ use crate::{
 pub use upload::{Upload, WORDS, outcome_from_words, outcome_words};
 
 /// Bytes that can wait to be sent: what a tick says at most, and some acknowledgements.
-pub const OUTBOX: usize = 2 * FRAME;
+pub const OUTBOX: usize = FRAME + FRAME / 2;
 /// Control ticks from one telemetry report to the next.
 const TELEMETRY_TICKS: u32 = 50;
 

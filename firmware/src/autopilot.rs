@@ -17,7 +17,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector4};
 
 use crate::{
     adapter::{Inference, Job, Lanes},
-    flight::{Flight, PREVIEW, Settings},
+    flight::{Flight, PREVIEW, Rates, Settings},
     guard::Trip,
     link::{
         Command, Order, Outcome, Reason, Received,
@@ -61,7 +61,7 @@ pub enum Reaction {
 #[derive(Debug)]
 pub struct Autopilot<'m> {
     flight: Flight<'m>,
-    settings: Option<Settings>,
+    rates: Option<Rates>,
     model: Option<&'m Model<'m>>,
     slot: Option<u8>,
     lanes: Lanes,
@@ -87,7 +87,7 @@ impl<'m> Autopilot<'m> {
     pub const fn new() -> Self {
         Self {
             flight: Flight::parked(),
-            settings: None,
+            rates: None,
             model: None,
             slot: None,
             lanes: Lanes::NONE,
@@ -109,8 +109,8 @@ impl<'m> Autopilot<'m> {
     /// If it does not fit the flight stack; then there is none.
     pub fn load(&mut self, model: &'m Model<'m>, slot: Option<u8>) -> Result<(), Refusal> {
         self.model = None;
-        match &self.settings {
-            Some(settings) => self.flight.attach(model, settings, Lanes::NONE)?,
+        match &self.rates {
+            Some(rates) => self.flight.engage(model, rates, Lanes::NONE)?,
             None => self.flight.hold(model),
         }
         (self.model, self.slot) = (Some(model), slot);
@@ -128,7 +128,7 @@ impl<'m> Autopilot<'m> {
         if !self.flight.configure(settings) {
             return Err(Reason::Settings);
         }
-        (self.settings, self.news, self.state) = (Some(*settings), News::new(settings), State::ORIGIN);
+        (self.rates, self.news, self.state) = (Some(settings.rates), News::new(&settings.rates), State::ORIGIN);
         match self.model {
             Some(model) => Flight::accepts(model, &settings.rates).map_err(|refusal| Reason::Model((&refusal).into())),
             None => Ok(()),
@@ -281,7 +281,7 @@ impl<'m> Autopilot<'m> {
         if self.armed {
             return Err(Reason::Armed);
         }
-        if self.settings.is_none() {
+        if self.rates.is_none() {
             return Err(Reason::Settings);
         }
         if self.news.lanes_off() {
@@ -298,8 +298,8 @@ impl<'m> Autopilot<'m> {
     /// Motors off. The next flight begins with a trajectory of its own, and with nothing left of this one.
     fn disarm(&mut self) {
         self.armed = false;
-        if let Some(settings) = &self.settings {
-            self.news = News::new(settings);
+        if let Some(rates) = &self.rates {
+            self.news = News::new(rates);
         }
         self.flight.land();
     }
@@ -340,7 +340,7 @@ impl<'m> Autopilot<'m> {
     /// Follows the tracking error, for the telemetry.
     fn watch(&mut self) {
         let error = self.state.position - self.flight.desired_position(Tick(self.tick.0.wrapping_sub(1)));
-        let rate = self.settings.map_or(1.0, |settings| settings.rates.control_hz);
+        let rate = self.rates.map_or(1.0, |rates| rates.control_hz);
         let share = 1.0 / rate.max(1.0);
         self.error_square += (error.norm_squared() - self.error_square) * share;
     }

@@ -45,14 +45,23 @@ impl<'a> Lane<'a> {
         Ok(lane)
     }
 
+    /// [`Lane::new`] in `place`. After an error there may be a part of a lane.
+    pub(crate) fn load(place: &mut Option<Self>, layout: &LaneLayout, blob: &Blob<'a>) -> Result<(), Refusal> {
+        Self::begin(place, layout).fill(layout, blob)
+    }
+
+    #[inline(never)]
+    fn begin<'p>(place: &'p mut Option<Self>, layout: &LaneLayout) -> &'p mut Self {
+        place.insert(Self::empty(layout))
+    }
+
     /// A lane whose axes are yet to come.
-    pub(crate) fn empty(layout: &LaneLayout) -> Self {
+    fn empty(layout: &LaneLayout) -> Self {
         Self { lags: layout.lags.into(), axes: Vec::new() }
     }
 
-    /// Checks the axes and puts them into an empty lane.
     #[inline(never)]
-    pub(crate) fn fill(&mut self, layout: &LaneLayout, blob: &Blob<'a>) -> Result<(), Refusal> {
+    fn fill(&mut self, layout: &LaneLayout, blob: &Blob<'a>) -> Result<(), Refusal> {
         let lags = self.lags;
         for axis in &layout.axes {
             let count = axis.errors.len() * lags;

@@ -157,7 +157,12 @@ impl<'m> Flight<'m> {
     /// # Errors
     /// If the model is for other signals, another rate, or a longer preview.
     pub fn attach(&mut self, model: &'m Model<'m>, settings: &Settings, lanes: Lanes) -> Result<(), Refusal> {
-        Self::accepts(model, &settings.rates)?;
+        self.engage(model, &settings.rates, lanes)
+    }
+
+    /// [`Flight::attach`], for which these settings are enough.
+    pub(crate) fn engage(&mut self, model: &'m Model<'m>, rates: &Rates, lanes: Lanes) -> Result<(), Refusal> {
+        Self::accepts(model, rates)?;
         self.hold(model);
         self.adapter.switch(lanes);
         self.fits = true;

@@ -143,10 +143,15 @@ impl Tasks {
     /// Storage: stores the piece that waits.
     #[inline]
     pub fn store<S: Slot>(&self, uploader: &mut Uploader<S>, scratch: &mut Scratch) {
-        let Some((_, words)) = self.uploads.take() else { return };
-        let upload = Upload::from_words(words);
+        let Some(upload) = self.piece() else { return };
         let outcome = upload.carry_out(uploader, scratch, fits);
         self.outcomes.put(upload.sequence.into(), &outcome_words(&outcome));
+    }
+
+    /// Apart, so that it is on the stack once.
+    #[inline(never)]
+    fn piece(&self) -> Option<Upload> {
+        self.uploads.take().map(|(_, words)| Upload::from_words(words))
     }
 
     /// Idle: the high-water mark of the stack.

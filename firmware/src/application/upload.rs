@@ -65,19 +65,27 @@ impl Upload {
         scratch: &mut Scratch,
         check: impl FnOnce(&Model<'_>) -> Result<(), Refusal>,
     ) -> Outcome {
-        let stored = self.with(|command| match command {
-            Command::ModelBegin { length, checksum } => match uploader.begin(Arming::Disarmed, length, checksum) {
-                Ok(0) => Ok(()),
-                Ok(expected) => Err(StorageError::Gap { expected, found: 0 }),
-                Err(error) => Err(error),
-            },
-            Command::ModelChunk(chunk) => uploader.write(Arming::Disarmed, chunk.offset, chunk.bytes).map(|_| ()),
-            _ => uploader.commit(Arming::Disarmed, scratch, check).map(|_| ()),
-        });
+        // The model that is checked takes enough of the stack: nothing else is on it then.
+        let stored = match self.commits() {
+            true => uploader.commit(Arming::Disarmed, scratch, check).map(|_| ()),
+            false => self.write(uploader),
+        };
         match stored {
             Ok(()) => Outcome::Done,
             Err(error) => Outcome::Refused(reason(&error)),
         }
+    }
+
+    #[inline(never)]
+    fn write<S: Slot>(&self, uploader: &mut Uploader<S>) -> Result<(), StorageError> {
+        self.with(|command| match command {
+            Command::ModelBegin { length, checksum } => match uploader.begin(Arming::Disarmed, length, checksum)? {
+                0 => Ok(()),
+                expected => Err(StorageError::Gap { expected, found: 0 }),
+            },
+            Command::ModelChunk(chunk) => uploader.write(Arming::Disarmed, chunk.offset, chunk.bytes).map(|_| ()),
+            _ => Ok(()),
+        })
     }
 
     /// The words for a mailbox.

@@ -3,7 +3,7 @@
 //! *in* the sender's ticks of what arrived, and control ticks; *out* when the add-on, and when the motors have to go off; *never* an older
 //! state for a newer one; *source* ours.
 
-use crate::flight::Settings;
+use crate::flight::Rates;
 
 /// How long the vehicle goes on with what it knows, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,9 +67,9 @@ impl News {
         Self { inertial: source, position: source }
     };
 
-    pub(super) fn new(settings: &Settings) -> Self {
+    pub(super) fn new(rates: &Rates) -> Self {
         let patience = Patience::default();
-        let rate = settings.rates.control_hz;
+        let rate = rates.control_hz;
         Self {
             inertial: Source::new(rate, patience.lanes_inertial_s, patience.motors_inertial_s),
             position: Source::new(rate, patience.lanes_position_s, patience.motors_position_s),

@@ -85,7 +85,7 @@ impl<'a> Model<'a> {
             Network::load(network, layout, blob, card.features.len(), card.outputs.len())?;
         }
         if let Some(layout) = &card.lane {
-            lane.insert(Lane::empty(layout)).fill(layout, blob)?;
+            Lane::load(lane, layout, blob)?;
         }
         load_rest(card, blob, envelope, monitor, bounds)?;
         let checked = network.as_ref().map(|network| (network, &*envelope, &*bounds));

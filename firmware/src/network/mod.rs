@@ -68,6 +68,7 @@ pub struct Network<'a> {
 impl<'a> Network<'a> {
     /// Checks shapes and sections against `inputs` features and `outputs` corrections, and makes the network in `place`. After an error
     /// there may be a part of one.
+    #[inline(never)]
     pub(crate) fn load(
         place: &mut Option<Self>,
         layout: &NetworkLayout,
