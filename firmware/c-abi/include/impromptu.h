@@ -335,7 +335,7 @@ const char *impromptu_status_text(int32_t status);
 // Checks a model file of `length` bytes and creates the model in `model`, which has `size` bytes (sizeof *model).
 //
 // The bytes stay where they are, in flash for instance: they must live and keep unchanged as long as the model. They should start at a multiple of
-// 16 bytes; elsewhere they are read by slower kernels, with the same results. Needs up to 16 KB of stack on a microcontroller; what is not said to need more, 2 KB.
+// 16 bytes; elsewhere they are read by slower kernels, with the same results. Needs up to 4 KB of stack on a microcontroller; what is not said to need more, 2 KB.
 impromptu_status impromptu_model_create(struct impromptu_model *model,
                                         size_t size,
                                         const uint8_t *bytes,
@@ -362,7 +362,7 @@ size_t impromptu_model_size(void);
 // Creates an adapter in `adapter`, which has `size` bytes, for a loop whose references run at `rate_hz`. Both lanes are off.
 //
 // `signals` is compared with the model's table, name by name; NULL takes the model's for the application's. The model must live as
-// long as the adapter. The first sample pushed will be that of reference tick `first_tick`. Needs up to 12 KB of stack.
+// long as the adapter. The first sample pushed will be that of reference tick `first_tick`. Needs up to 8 KB of stack.
 impromptu_status impromptu_adapter_create(struct impromptu_adapter *adapter,
                                           size_t size,
                                           const struct impromptu_model *model,
@@ -433,13 +433,12 @@ impromptu_status impromptu_adapter_report(struct impromptu_adapter *adapter, str
 size_t impromptu_adapter_size(void);
 
 // Creates a flight stack in `flight`, which has `size` bytes, with no add-on. The first setpoint is that of reference tick 0.
-// Needs up to 32 KB of stack.
 impromptu_status impromptu_flight_create(struct impromptu_flight *flight,
                                          size_t size,
                                          const struct impromptu_flight_settings *settings);
 
 // Puts an add-on before the loop, with the lanes that are not 0 on. The model must live as long as the flight stack.
-// Needs up to 12 KB of stack.
+// Needs up to 8 KB of stack.
 impromptu_status impromptu_flight_attach(struct impromptu_flight *flight,
                                          const struct impromptu_model *model,
                                          int network,

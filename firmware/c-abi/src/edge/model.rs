@@ -21,7 +21,7 @@ pub extern "C" fn impromptu_status_text(status: i32) -> *const c_char {
 /// Checks a model file of `length` bytes and creates the model in `model`, which has `size` bytes (sizeof *model).
 ///
 /// The bytes stay where they are, in flash for instance: they must live and keep unchanged as long as the model. They should start at a multiple of
-/// 16 bytes; elsewhere they are read by slower kernels, with the same results. Needs up to 8 KB of stack on a microcontroller; what is not said to need more, 2 KB.
+/// 16 bytes; elsewhere they are read by slower kernels, with the same results. Needs up to 4 KB of stack on a microcontroller; what is not said to need more, 2 KB.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_model_create(model: *mut ModelMemory, size: usize, bytes: *const u8, length: usize) -> Status {
     let bytes = match checked(bytes) {
