@@ -27,6 +27,8 @@ struct Image {
     bin: &'static str,
     /// Handlers by priority, lowest first. Of one level the deepest counts: none interrupts another.
     levels: [&'static [&'static str]; 3],
+    /// Most bytes of RAM.
+    ram: u32,
     /// Memory that stands for flash.
     flash: &'static [&'static str],
     /// What ends the program, and is not followed: on the real board nothing but a reset.
@@ -34,11 +36,12 @@ struct Image {
 }
 
 const IMAGES: [Image; 2] = [
-    Image { bin: "crazyflie", levels: [&["DCMI", "CRYP"], &["SysTick"], &["USART3"]], flash: &[], ends: &[] },
-    // Its panics print. `elf/mod.rs` proves that the tasks have none but in what talks to the host.
+    Image { bin: "crazyflie", levels: [&["DCMI", "CRYP"], &["SysTick"], &["USART3"]], ram: RAM, flash: &[], ends: &[] },
+    // Its queue of received bytes is larger by 1.5 KB: the host sends without a baud rate. Its panics print. `elf/mod.rs` proves that the tasks have none but in what talks to the host.
     Image {
         bin: "emulated",
         levels: [&["DCMI", "CRYP"], &["SysTick"], &["USART1"]],
+        ram: RAM + 1536,
         flash: &["FileSlot::new::IMPROMPTU_WEIGHTS"],
         ends: &["rust_begin_unwind"],
     },
@@ -90,7 +93,7 @@ fn both_boards_are_within_the_budget_stack_included() {
             writeln!(text, "\n{:>7} {root}", path.iter().map(|(_, bytes)| bytes).sum::<u32>()).unwrap();
             path.iter().for_each(|(name, bytes)| writeln!(text, "{bytes:>7}   {name}").unwrap());
         }
-        assert!(footprint.flash <= FLASH && total <= RAM, "over budget:\n{text}");
+        assert!(footprint.flash <= FLASH && total <= image.ram, "over budget:\n{text}");
     }
     golden::compare_for_compiler(GOLDEN, &compiler, &text).unwrap();
 }
