@@ -7,7 +7,7 @@
 use impromptu_firmware::{
     adapter::Lanes,
     features::{Feature, Relative, Source},
-    model::Model,
+    model::{Interpolation, Model},
     quadrotor::REFERENCE,
 };
 use impromptu_model_export::{ExportError, FloatNetwork, Precision, encode};
@@ -15,7 +15,7 @@ use impromptu_model_export::{ExportError, FloatNetwork, Precision, encode};
 use super::inputs::Origin;
 use crate::{
     examples::{ExampleSettings, examples},
-    experiment::{Loop, Recipe, Rows, describe, reduction, smoothing},
+    experiment::{Loop, Recipe, Rows, describe, feedforward, reduction, smoothing},
     flight_log::FlightLog,
     rollout::FlightPlan,
     training::{Dataset, Ridge, RowMatrix, train},
@@ -124,9 +124,8 @@ fn with_bypass(network: &FloatNetwork, gain: f32) -> FloatNetwork {
     }
     let skip = network.skip.clone().unwrap_or_else(|| vec![0.0; inputs * REFERENCE]);
     let scale = network.output_scale.clone();
-    wide.skip = Some(widened(&skip, &|row| {
-        (0..REFERENCE).map(|column| if column == row { gain / scale[row] } else { 0.0 }).collect()
-    }));
+    wide.skip =
+        Some(widened(&skip, &|row| (0..REFERENCE).map(|column| if column == row { gain / scale[row] } else { 0.0 }).collect()));
     wide
 }
 
@@ -147,12 +146,7 @@ impl Learned {
             (_, false) => Some(((0..REFERENCE as u8).map(now).collect(), -1.0)),
             (Origin::Measured, true) => Some((
                 (0..REFERENCE as u8)
-                    .map(|channel| Feature {
-                        source: Source::Measured,
-                        channel,
-                        offset: 0,
-                        relative: Relative::Desired(channel),
-                    })
+                    .map(|channel| Feature { source: Source::Measured, channel, offset: 0, relative: Relative::Desired(channel) })
                     .collect(),
                 1.0,
             )),
@@ -167,12 +161,27 @@ impl Learned {
         encode(&description, Some(&with_bypass(network, gain)), Precision::Float, &calibration)
     }
 
+    /// The same, held or ramped between sub-rate ticks.
+    #[must_use]
+    pub fn at(&self, interpolation: Interpolation) -> Self {
+        Self { recipe: Recipe { interpolation, ..self.recipe.clone() }, ..self.clone() }
+    }
+
     /// The network's file as it was trained.
     ///
     /// # Errors
     /// If it cannot be encoded.
     pub fn network_file(&self, plant: &Loop) -> Result<Vec<u8>, ExportError> {
         self.file(plant, &self.network, &self.recipe.features(), Origin::Desired)
+    }
+
+    /// p_r = p_d + a_d / kp, without anything learned, for the same loop.
+    ///
+    /// # Errors
+    /// If it cannot be encoded.
+    pub fn feedforward_file(&self, plant: &Loop) -> Result<Vec<u8>, ExportError> {
+        let description = describe(&self.recipe, plant, &self.rows, None, "feedforward", "", self.recipe.network.seed);
+        feedforward(&plant.settings, description)
     }
 
     /// The ridge regression's.

@@ -78,7 +78,14 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<Lear
             ));
         }
         let cm = 100.0 * errors.iter().sum::<f64>() / errors.len() as f64;
-        study.find(Finding::new(SECTION, &format!("inputs_{name}_error"), &[25], &format!("{name} inputs: mean RMS error"), cm, "cm"));
+        study.find(Finding::new(
+            SECTION,
+            &format!("inputs_{name}_error"),
+            &[25],
+            &format!("{name} inputs: mean RMS error"),
+            cm,
+            "cm",
+        ));
         logs.push(ground.test.logs(plant, Some(&file))?);
     }
     let cm = 100.0 * ground.test.baseline.iter().sum::<f64>() / 5.0;
@@ -161,9 +168,11 @@ fn figures(study: &mut Study, flights: [(&str, &FlightLog); 3]) {
             "desired",
             drawn(flights[0].1, &|tick| Some((x(flights[0].1, tick, true)?, y(flights[0].1, tick, true)?))),
         )];
-        curves.extend(flights.iter().map(|(name, log)| {
-            Curve::line(name, drawn(log, &|tick| Some((x(log, tick, false)?, y(log, tick, false)?))))
-        }));
+        curves.extend(
+            flights
+                .iter()
+                .map(|(name, log)| Curve::line(name, drawn(log, &|tick| Some((x(log, tick, false)?, y(log, tick, false)?))))),
+        );
         curves
     };
     let coordinate = |axis: usize| {
@@ -183,7 +192,13 @@ fn figures(study: &mut Study, flights: [(&str, &FlightLog); 3]) {
         Axis::linear("z [m]"),
         curves(&coordinate(across), &coordinate(2)),
     );
-    draw("fig_3_across", "The same over time, across", Axis::linear("time [s]"), Axis::linear("across [m]"), curves(&time, &coordinate(across)));
+    draw(
+        "fig_3_across",
+        "The same over time, across",
+        Axis::linear("time [s]"),
+        Axis::linear("across [m]"),
+        curves(&time, &coordinate(across)),
+    );
     draw("fig_3_z", "The same over time, z", Axis::linear("time [s]"), Axis::linear("z [m]"), curves(&time, &coordinate(2)));
 }
 

@@ -1,0 +1,110 @@
+//! What the training flights must excite.
+//!
+//! *in* five training signals of about equal length; *out* reductions with the same 12 inputs, network and budget; *never* a signal with the test's
+//! trajectories in it; *source* Li et al., ICRA 2017 (three growing tones); the others are ours.
+
+use rayon::prelude::*;
+
+use super::{
+    Ground,
+    addon::{Course, Learned, learn},
+    inputs::{Origin, twelve},
+    multisine,
+};
+use crate::{
+    experiment::{Excitation, Purpose, Signal, derived},
+    report::{Axis, Curve, Figure},
+    study::{Finding, Study},
+    trajectory::{Motion, growing_tones, single_tone},
+};
+
+const SECTION: &str = "Training signals";
+
+/// The signals: name, words, motions.
+fn signals(ground: &Ground<'_>) -> Vec<(&'static str, &'static str, Vec<Motion>)> {
+    let seed = derived(ground.settings.seed, Purpose::Training);
+    let flights = ground.settings.flights;
+    let seconds = 100.0 * f64::from(flights);
+    // One flight has no fourth: the same again decides when to stop.
+    let repeated = |motions: Vec<Motion>| [motions.clone(), motions].concat();
+    let random = |signal, flights, shortest_s| Excitation { signal, flights, shortest_s, ..multisine(flights) }.motions(seed);
+    let sine = (0..3).map(|axis| single_tone(axis, 0.8, 6.0, 6.0 * (seconds / 18.0).floor().max(2.0))).collect();
+    vec![
+        ("sine", "one sine, axis by axis", repeated(sine)),
+        ("tones", "three growing tones (the predecessor's)", repeated(vec![growing_tones([6.0, 7.5, 9.0], 0.75 * seconds)])),
+        ("multisine", "multisine, twelve tones an axis", random(Signal::Multisine, flights, 1.5)),
+        ("spline", "splines through random points", random(Signal::Spline, flights, 1.5)),
+        ("strokes", "strokes of other seeds", random(Signal::Strokes, 5 * flights, 0.0)),
+    ]
+}
+
+/// Trains on each signal and flies validation strokes and test trajectories.
+pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> {
+    let plant = &ground.plant;
+    let first = derived(ground.settings.seed, Purpose::Training);
+    let found: Vec<(&str, &str, Learned, [(f64, f64); 4])> = signals(ground)
+        .into_par_iter()
+        .map(|(name, words, motions)| {
+            let logs = plant.collect(&motions, None, first)?;
+            let learned = learn(&ground.recipe(twelve(Origin::Measured)), plant, &logs, true)?;
+            let fly = |course: &Course, network, origin| {
+                course.reduction(plant, &learned.file(plant, network, &twelve(origin), Origin::Desired)?)
+            };
+            let flown = [
+                fly(&ground.test, &learned.network, Origin::Measured)?,
+                fly(&ground.test, &learned.network, Origin::Desired)?,
+                fly(&ground.test, &learned.ridge, Origin::Measured)?,
+                fly(&ground.test, &learned.ridge, Origin::Desired)?,
+            ];
+            Ok((name, words, learned, flown))
+        })
+        .collect::<anyhow::Result<_>>()?;
+    let kinds = ["network_y", "network_yd", "ridge_y", "ridge_yd"];
+    let words =
+        ["network, inputs relative to y", "network, inputs relative to y_d", "ridge, relative to y", "ridge, relative to y_d"];
+    for (name, signal, learned, flown) in &found {
+        for ((kind, word), (mean, _)) in kinds.iter().zip(words).zip(flown) {
+            study.find(Finding::new(
+                SECTION,
+                &format!("signal_{name}_{kind}"),
+                &[18, 28],
+                &format!("{signal}: {word}, mean over the five test trajectories"),
+                mean.max(-1e6),
+                "%",
+            ));
+        }
+        study.find(Finding::new(
+            SECTION,
+            &format!("signal_{name}_rows"),
+            &[18],
+            &format!("{signal}: R² of the network on the flights kept from training"),
+            100.0 * learned.determination,
+            "%",
+        ));
+    }
+    study.draw(Figure {
+        section: SECTION.into(),
+        name: "signals".into(),
+        title: format!(
+            "Mean reduction by training signal: {}; worse than -100 % is drawn as -100 %",
+            found.iter().enumerate().map(|(index, (name, ..))| format!("{} {name}", index + 1)).collect::<Vec<_>>().join(", ")
+        ),
+        x: Axis::linear("training signal"),
+        y: Axis::linear("reduction [%]"),
+        curves: kinds
+            .iter()
+            .enumerate()
+            .map(|(kind, _)| {
+                Curve::line_and_dots(
+                    words[kind],
+                    found.iter().enumerate().map(|(index, (.., flown))| ((index + 1) as f64, flown[kind].0.max(-100.0))),
+                )
+            })
+            .collect(),
+    });
+    study.note(
+        SECTION,
+        "R² on rows of the same signal says nothing about the reduction in flight: a signal that excites little is easily fitted.",
+    );
+    Ok(())
+}
