@@ -3,7 +3,7 @@
 //! *in* a Crazyflie and the predecessor's loop; *out* reductions over validation-like strokes by sub-rate, held and interpolated, and by preview;
 //! *never* a sub-rate that is not a whole part of the reference's rate; *source* Zhou 2017, section V-A (the module is slower than the loop).
 
-use impromptu_firmware::model::Interpolation;
+use impromptu_firmware::{flight::PREVIEW, model::Interpolation};
 use rayon::prelude::*;
 
 use super::{
@@ -35,10 +35,13 @@ const DEGREES: [i16; 7] = [1, 2, 3, 4, 5, 6, 8];
 fn windowed(recipe: &Recipe, divisor: u16, future_s: f64) -> Recipe {
     let tick = f64::from(divisor) / 100.0;
     let ticks = |seconds: f64| (seconds / tick).round() as i16;
+    let past = ticks(WINDOW[0]).max(1);
+    // The ramp needs one tick more, and all of it has to fit into the flight stack's preview.
+    let most = ((PREVIEW - 1) / usize::from(divisor)) as i16 - past - 1;
     Recipe {
         features: None,
         divisor,
-        window: [-ticks(WINDOW[0]).max(1), ticks(future_s).max(i16::from(future_s > 0.0))],
+        window: [-past, ticks(future_s).min(most)],
         window_step: ticks(WINDOW[2]).max(1),
         ..recipe.clone()
     }
@@ -206,7 +209,7 @@ mod tests {
         for divisor in DIVISORS {
             let recipe = windowed(&Recipe::default(), divisor, WINDOW[1]);
             let span = (recipe.window[1] + 1 - recipe.window[0]) * divisor as i16;
-            assert!(span < impromptu_firmware::flight::PREVIEW as i16 && recipe.window[0] < 0 && recipe.window[1] > 0);
+            assert!(span < PREVIEW as i16 && recipe.window[0] < 0 && recipe.window[1] > 0);
             assert!(recipe.features().len() <= impromptu_firmware::model::MAX_FEATURES);
             let ahead = f64::from(recipe.window[1] * divisor as i16) / 100.0;
             assert!((ahead - WINDOW[1]).abs() <= 0.31, "{divisor}: {ahead} s");
