@@ -132,9 +132,9 @@ pub fn run(settings: &QuadrotorSettings, command: &str, stage: &dyn Fn(&str)) ->
     stage("training flights of the predecessor's loop");
     let ground = Ground::new(settings)?;
     stage("Table I and Fig. 3");
-    let twelve = table::run(&ground, &mut study)?;
+    let networks = table::run(&ground, &mut study)?;
     stage("reference points");
-    origins::run(&ground, &twelve, &mut study)?;
+    origins::run(&ground, &networks.twelve, &mut study)?;
     stage("training signals");
     signals::run(&ground, &mut study)?;
     stage("Fig. 4");
@@ -146,8 +146,11 @@ pub fn run(settings: &QuadrotorSettings, command: &str, stage: &dyn Fn(&str)) ->
     stage("network sizes");
     sizes::run(&crazyflie, &mut study)?;
     stage("strokes on the predecessor's loop");
-    strokes::predecessor(&ground, &twelve, &mut study)?;
+    strokes::predecessor(&ground, &networks, &mut study)?;
     stage("strokes on the Crazyflie");
     strokes::crazyflie(&ground, &crazyflie, &mut study)?;
     Ok(study)
 }
+
+#[cfg(test)]
+mod tests;

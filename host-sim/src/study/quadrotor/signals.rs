@@ -67,7 +67,7 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> 
             study.find(Finding::new(
                 SECTION,
                 &format!("signal_{name}_{kind}"),
-                &[18, 28],
+                &[28],
                 &format!("{signal}: {word}, mean over the five test trajectories"),
                 mean.max(-1e6),
                 "%",
@@ -76,7 +76,7 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> 
         study.find(Finding::new(
             SECTION,
             &format!("signal_{name}_rows"),
-            &[18],
+            &[28],
             &format!("{signal}: R² of the network on the flights kept from training"),
             100.0 * learned.determination,
             "%",

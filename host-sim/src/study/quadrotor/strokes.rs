@@ -7,11 +7,11 @@ use impromptu_firmware::adapter::Lanes;
 
 use super::{
     Ground,
-    addon::{Course, Learned, NETWORK, learn},
+    addon::{Course, NETWORK},
     crazyflie::Crazyflie,
-    inputs::{Origin, thirty_six},
     predecessor::SPEED,
     references::{IterativeLearning, best_shift, shifted},
+    table::Networks,
 };
 use crate::{
     experiment::{Loop, Purpose, Recipe, build, derived, reduction},
@@ -24,7 +24,7 @@ use crate::{
 type Flown = (&'static str, &'static str, Vec<f64>);
 
 /// The paper's loop and networks.
-pub(super) fn predecessor(ground: &Ground<'_>, twelve_inputs: &Learned, study: &mut Study) -> anyhow::Result<()> {
+pub(super) fn predecessor(ground: &Ground<'_>, networks: &Networks, study: &mut Study) -> anyhow::Result<()> {
     let section = "Strokes: the predecessor's loop";
     let plant = &ground.plant;
     let seed = derived(ground.settings.seed, Purpose::Test);
@@ -32,17 +32,16 @@ pub(super) fn predecessor(ground: &Ground<'_>, twelve_inputs: &Learned, study: &
         .map(|index| stroke(seed, index).scaled(SPEED / STROKE_SPEED).sampled(plant.rate_hz()))
         .collect::<Result<_, _>>()?;
     let course = Course::new(plant, test, seed)?;
-    let others = learn(&ground.recipe(thirty_six(Origin::Measured)), plant, &ground.logs, true)?;
     let mut flown: Vec<Flown> = vec![("baseline", "doing nothing", course.baseline.clone())];
     without_model(ground.settings.trials, plant, &ground.validation, &course, section, study, &mut flown)?;
     let mut fly = |name, words, file: &[u8]| -> anyhow::Result<()> {
         flown.push((name, words, course.errors(plant, file, NETWORK)?));
         Ok(())
     };
-    fly("flatness", "flatness feed-forward", &twelve_inputs.feedforward_file(plant)?)?;
-    fly("ridge_12", "ridge, 12 inputs", &twelve_inputs.ridge_file(plant)?)?;
-    fly("network_36", "network, 36 inputs", &others.network_file(plant)?)?;
-    fly("network_12", "network, 12 inputs", &twelve_inputs.network_file(plant)?)?;
+    fly("flatness", "flatness feed-forward", &networks.twelve.feedforward_file(plant)?)?;
+    fly("ridge_12", "ridge, 12 inputs", &networks.twelve_file(plant, &networks.twelve.ridge)?)?;
+    fly("network_36", "network, 36 inputs", &networks.thirty_six.network_file(plant)?)?;
+    fly("network_12", "network, 12 inputs", &networks.twelve_file(plant, &networks.twelve.network)?)?;
     report(
         study,
         section,
