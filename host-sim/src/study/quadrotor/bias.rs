@@ -86,6 +86,9 @@ fn lists() -> [(&'static str, &'static str, Vec<Feature>); 2] {
     [("difference", "difference learning", paper), ("absolute_z", "absolute heights as inputs", absolute)]
 }
 
+/// Flights of the steps: name, words, logs.
+type Flown = (String, String, Vec<FlightLog>);
+
 /// Trains both and flies the steps.
 pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> {
     let rate = ground.plant.rate_hz();
@@ -99,16 +102,17 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> 
         log.rows.drain(..(5.0 * rate) as usize);
     }
     let baseline = fly(ground, &steps, None)?;
-    let learned: Vec<_> = lists()
+    let learned: Vec<Vec<Flown>> = lists()
         .into_par_iter()
         .map(|(name, words, list)| {
             let learned = learn(&ground.recipe(list), &ground.plant, &logs, true)?;
-            let flown = fly(ground, &steps, Some(&learned.network_file(&ground.plant)?))?;
-            Ok((name, words, flown))
+            let network = fly(ground, &steps, Some(&learned.network_file(&ground.plant)?))?;
+            let ridge = fly(ground, &steps, Some(&learned.ridge_file(&ground.plant)?))?;
+            Ok(vec![(name.to_owned(), words.to_owned(), network), (format!("{name}_ridge"), format!("{words}, ridge"), ridge)])
         })
         .collect::<anyhow::Result<_>>()?;
-    let mut flown = vec![("baseline", "no add-on", baseline)];
-    flown.extend(learned);
+    let mut flown: Vec<Flown> = vec![("baseline".into(), "no add-on".into(), baseline)];
+    flown.extend(learned.into_iter().flatten());
     for (name, words, logs) in &flown {
         let finding = Finding::new(
             SECTION,
@@ -118,7 +122,7 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> 
             settled(&logs[0]),
             "m",
         );
-        study.find(if *name == "baseline" { finding.paper(f64::from(GAIN)) } else { finding });
+        study.find(if name == "baseline" { finding.paper(f64::from(GAIN)) } else { finding });
         let worst = logs.iter().zip(HEIGHTS).map(|(log, height)| (settled(log) - height).abs()).fold(0.0, f64::max);
         study.find(Finding::new(
             SECTION,

@@ -26,6 +26,11 @@ pub(super) struct Crazyflie {
     /// The same at 1.7 times the speed, where the motors saturate.
     pub(super) fast_course: Course,
     pub(super) recipe: Recipe,
+    /// The brushless vehicle, clean: a loop whose inverse is less linear.
+    pub(super) brushless: Loop,
+    pub(super) brushless_logs: Vec<FlightLog>,
+    pub(super) brushless_course: Course,
+    pub(super) brushless_fast_course: Course,
 }
 
 /// Training strokes at some speeds.
@@ -52,6 +57,7 @@ impl Crazyflie {
         let condition = |name: &str| Condition::named(name).ok_or_else(|| anyhow::anyhow!("no condition `{name}`"));
         let clean = Loop::new(vehicle.clone(), "stock", condition("clean")?)?.unguarded();
         let lab = Loop::new(vehicle, "stock", condition("lab")?)?.unguarded();
+        let brushless = Loop::new(Vehicle::named("crazyflie-brushless")?, "stock", condition("clean")?)?.unguarded();
         let first = derived(settings.seed, Purpose::Training);
         let excitations = excitations(&[1.0, 2.0], settings.crazyflie_flights / 2);
         let collect = |plant: &Loop| -> anyhow::Result<Vec<FlightLog>> {
@@ -70,6 +76,10 @@ impl Crazyflie {
             clean_course: course(&clean, 1.0)?,
             lab_course: course(&lab, 1.0)?,
             fast_course: course(&lab, 1.7)?,
+            brushless_logs: collect(&brushless)?,
+            brushless_course: course(&brushless, 1.0)?,
+            brushless_fast_course: course(&brushless, 1.7)?,
+            brushless,
             recipe: Recipe {
                 interpolation: Interpolation::Linear,
                 stride: 10,

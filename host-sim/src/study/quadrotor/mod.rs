@@ -141,6 +141,7 @@ pub fn run(settings: &QuadrotorSettings, command: &str, stage: &dyn Fn(&str)) ->
     bias::run(&ground, &mut study)?;
     stage("training flights of the Crazyflie");
     let crazyflie = Crazyflie::new(settings)?;
+    signals::crazyflie(&ground, &crazyflie, &mut study)?;
     stage("sub-rates and previews");
     rates::run(&ground, &crazyflie, &mut study)?;
     stage("network sizes");

@@ -1,6 +1,6 @@
 //! Network sizes: tracking against cycles on the microcontroller.
 //!
-//! *in* a Crazyflie in the lab, trained up to twice the test strokes' speed; *out* reductions at 1 and 1.7 times the speed, and cycles; *never* cycles that
+//! *in* a Crazyflie in the lab and a clean brushless one, trained up to twice the test strokes' speed; *out* reductions at 1 and 1.7 times the speed, and cycles; *never* cycles that
 //! the golden table contradicts; *source* `tests/golden/mcu.txt`: cycles of the int8 kernel with its weights in flash.
 
 use impromptu_model_export::float_network::Activation;
@@ -35,10 +35,21 @@ fn words(hidden: &[usize]) -> String {
     }
 }
 
+/// Where sizes are compared: name, words.
+const CASES: [(&str, &str); 4] = [
+    ("lab", "Crazyflie, lab"),
+    ("lab_fast", "Crazyflie, lab, 1.7 times as fast"),
+    ("brushless", "Crazyflie Brushless, clean"),
+    ("brushless_fast", "Crazyflie Brushless, clean, 1.7 times as fast"),
+];
+
 /// Trains each size and flies.
 pub(super) fn run(crazyflie: &Crazyflie, study: &mut Study) -> anyhow::Result<()> {
-    let plant = &crazyflie.lab;
-    let found: Vec<[(f64, f64); 2]> = SIZES
+    let loops = [
+        (&crazyflie.lab, &crazyflie.lab_logs, [&crazyflie.lab_course, &crazyflie.fast_course]),
+        (&crazyflie.brushless, &crazyflie.brushless_logs, [&crazyflie.brushless_course, &crazyflie.brushless_fast_course]),
+    ];
+    let found: Vec<Vec<(f64, f64)>> = SIZES
         .par_iter()
         .map(|hidden| {
             let activation = if hidden.len() > 2 { Activation::Relu } else { Activation::Tanh };
@@ -46,9 +57,16 @@ pub(super) fn run(crazyflie: &Crazyflie, study: &mut Study) -> anyhow::Result<()
                 true => crazyflie.linear(),
                 false => TrainingSettings { hidden: hidden.to_vec(), activation, ..crazyflie.recipe.network.clone() },
             };
-            let learned = learn(&Recipe { network, ..crazyflie.recipe.clone() }, plant, &crazyflie.lab_logs, true)?;
-            let file = if hidden.is_empty() { learned.ridge_file(plant)? } else { learned.network_file(plant)? };
-            Ok([crazyflie.lab_course.reduction(plant, &file)?, crazyflie.fast_course.reduction(plant, &file)?])
+            let recipe = Recipe { network, ..crazyflie.recipe.clone() };
+            let mut flown = Vec::new();
+            for (plant, logs, courses) in loops {
+                let learned = learn(&recipe, plant, logs, true)?;
+                let file = if hidden.is_empty() { learned.ridge_file(plant)? } else { learned.network_file(plant)? };
+                for course in courses {
+                    flown.push(course.reduction(plant, &file)?);
+                }
+            }
+            Ok(flown)
         })
         .collect::<anyhow::Result<_>>()?;
     let inputs = crazyflie.recipe.features().len();
@@ -59,22 +77,27 @@ pub(super) fn run(crazyflie: &Crazyflie, study: &mut Study) -> anyhow::Result<()
             study.find(Finding::new(SECTION, &format!("size_{name}_{key}"), &[21, 30], &format!("{name}: {what}"), value, unit));
         };
         find("cycles", "cycles of an evaluation, estimated", *cost, "");
-        find("mean", "mean reduction over strokes at normal speed", found[0].0, "%");
-        find("fast", "mean reduction at 1.7 times the speed", found[1].0, "%");
-        find("fast_worst", "worst reduction at 1.7 times the speed", found[1].1, "%");
+        for ((key, case), (mean, worst)) in CASES.iter().zip(found) {
+            find(key, &format!("{case}: mean reduction"), *mean, "%");
+            find(&format!("{key}_worst"), &format!("{case}: worst reduction"), *worst, "%");
+        }
     }
     study.draw(Figure {
         section: SECTION.into(),
         name: "sizes".into(),
         title: format!(
-            "Crazyflie, lab: reduction against cycles, from left to right {}",
+            "Mean reduction over strokes against cycles; from left to right {}",
             SIZES.iter().map(|hidden| words(hidden)).collect::<Vec<_>>().join(", ")
         ),
         x: Axis::logarithmic("cycles of an evaluation"),
         y: Axis::linear("mean reduction [%]"),
-        curves: [(0, "normal speed"), (1, "1.7 times as fast")]
-            .map(|(way, kind)| Curve::line_and_dots(kind, cost.iter().zip(&found).map(|(cost, found)| (*cost, found[way].0))))
-            .into(),
+        curves: CASES
+            .iter()
+            .enumerate()
+            .map(|(case, (_, words))| {
+                Curve::line_and_dots(words, cost.iter().zip(&found).map(|(cost, found)| (*cost, found[case].0)))
+            })
+            .collect(),
     });
     study.note(
         SECTION,
