@@ -304,10 +304,7 @@ fn between(a: &LogRow, b: &LogRow, time: f64) -> LogRow {
         reference_velocity: vector(a.reference_velocity, b.reference_velocity),
         measured_position: vector(a.measured_position, b.measured_position),
         measured_velocity: vector(a.measured_velocity, b.measured_velocity),
-        measured_body: a
-            .measured_body
-            .zip(b.measured_body)
-            .map(|(a, b)| std::array::from_fn(|channel| scalar(a[channel], b[channel]))),
+        measured_body: a.measured_body.zip(b.measured_body).map(|(a, b)| std::array::from_fn(|i| scalar(a[i], b[i]))),
         true_position: a.true_position.zip(b.true_position).map(|(a, b)| vector(a, b)),
     }
 }

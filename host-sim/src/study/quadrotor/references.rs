@@ -178,7 +178,7 @@ mod tests {
         let early = shifted(&plant, &course, 1.0).unwrap();
         let learning = IterativeLearning { gain: 0.5, smoothing_s: 0.1, delay_s: 1.0 };
         let trials = learning.fly(&plant, &course, 6).unwrap();
-        assert!(mean(&early) < 0.5 * mean(&none), "{early:?} {none:?}");
+        assert!(mean(&early) < 0.6 * mean(&none), "{early:?} {none:?}");
         assert!(mean(&trials[6]) < mean(&early) && mean(&trials[6]) < mean(&trials[1]), "{trials:?}");
     }
 }
