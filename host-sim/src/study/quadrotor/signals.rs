@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{
     Ground,
-    addon::{Course, Learned, learn},
+    addon::{Course, learn},
     crazyflie::Crazyflie,
     inputs::{Origin, twelve},
     multisine,
@@ -20,6 +20,16 @@ use crate::{
 };
 
 const SECTION: &str = "Training signals";
+
+/// What came of a signal.
+struct Flown<const N: usize> {
+    name: &'static str,
+    words: &'static str,
+    /// R² on rows kept from training.
+    determination: f64,
+    /// Mean and worst reduction in each of the ways of flying.
+    reductions: [(f64, f64); N],
+}
 
 /// The signals: name, words, motions.
 fn signals(ground: &Ground<'_>) -> Vec<(&'static str, &'static str, Vec<Motion>)> {
@@ -43,7 +53,7 @@ fn signals(ground: &Ground<'_>) -> Vec<(&'static str, &'static str, Vec<Motion>)
 pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> {
     let plant = &ground.plant;
     let first = derived(ground.settings.seed, Purpose::Training);
-    let found: Vec<(&str, &str, Learned, [(f64, f64); 4])> = signals(ground)
+    let found: Vec<Flown<4>> = signals(ground)
         .into_par_iter()
         .map(|(name, words, motions)| {
             let logs = plant.collect(&motions, None, first)?;
@@ -57,14 +67,14 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> 
                 fly(&ground.test, &learned.ridge, Origin::Measured)?,
                 fly(&ground.test, &learned.ridge, Origin::Desired)?,
             ];
-            Ok((name, words, learned, flown))
+            Ok(Flown { name, words, determination: learned.determination, reductions: flown })
         })
         .collect::<anyhow::Result<_>>()?;
     let kinds = ["network_y", "network_yd", "ridge_y", "ridge_yd"];
     let words =
         ["network, inputs relative to y", "network, inputs relative to y_d", "ridge, relative to y", "ridge, relative to y_d"];
-    for (name, signal, learned, flown) in &found {
-        for ((kind, word), (mean, _)) in kinds.iter().zip(words).zip(flown) {
+    for Flown { name, words: signal, determination, reductions } in &found {
+        for ((kind, word), (mean, _)) in kinds.iter().zip(words).zip(reductions) {
             study.find(Finding::new(
                 SECTION,
                 &format!("signal_{name}_{kind}"),
@@ -79,7 +89,7 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> 
             &format!("signal_{name}_rows"),
             &[28],
             &format!("{signal}: R² of the network on the flights kept from training"),
-            100.0 * learned.determination,
+            100.0 * determination,
             "%",
         ));
     }
@@ -88,7 +98,7 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> 
         name: "signals".into(),
         title: format!(
             "Mean reduction by training signal: {}; worse than -100 % is drawn as -100 %",
-            found.iter().enumerate().map(|(index, (name, ..))| format!("{} {name}", index + 1)).collect::<Vec<_>>().join(", ")
+            found.iter().enumerate().map(|(index, flown)| format!("{} {}", index + 1, flown.name)).collect::<Vec<_>>().join(", ")
         ),
         x: Axis::linear("training signal"),
         y: Axis::linear("reduction [%]"),
@@ -96,9 +106,9 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> 
             .iter()
             .enumerate()
             .map(|(kind, _)| {
-                Curve::line_and_dots(
+                Curve::dots(
                     words[kind],
-                    found.iter().enumerate().map(|(index, (.., flown))| ((index + 1) as f64, flown[kind].0.max(-100.0))),
+                    found.iter().enumerate().map(|(index, flown)| ((index + 1) as f64, flown.reductions[kind].0.max(-100.0))),
                 )
             })
             .collect(),
@@ -115,17 +125,23 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> 
 pub(super) fn crazyflie(ground: &Ground<'_>, crazyflie: &Crazyflie, study: &mut Study) -> anyhow::Result<()> {
     let plant = &crazyflie.lab;
     let first = derived(ground.settings.seed, Purpose::Training);
-    let found: Vec<(&str, &str, [(f64, f64); 2])> = signals(ground)
+    let found: Vec<Flown<2>> = signals(ground)
         .into_par_iter()
         .map(|(name, words, motions)| {
             let logs = plant.collect(&motions, None, first)?;
             let learned = learn(&crazyflie.recipe, plant, &logs, true)?;
             let fly = |file: Vec<u8>| crazyflie.lab_course.reduction(plant, &file);
-            Ok((name, words, [fly(learned.ridge_file(plant)?)?, fly(learned.network_file(plant)?)?]))
+            Ok(Flown {
+                name,
+                words,
+                determination: learned.determination,
+                reductions: [fly(learned.ridge_file(plant)?)?, fly(learned.network_file(plant)?)?],
+            })
         })
         .collect::<anyhow::Result<_>>()?;
-    for (name, words, flown) in &found {
-        for ((kind, map), (mean, worst)) in [("ridge", "ridge on the window"), ("network", "network beside it")].iter().zip(flown)
+    for Flown { name, words, reductions, .. } in &found {
+        for ((kind, map), (mean, worst)) in
+            [("ridge", "ridge on the window"), ("network", "network beside it")].iter().zip(reductions)
         {
             for (key, what, value) in [("", "mean", mean), ("_worst", "worst", worst)] {
                 study.find(Finding::new(
