@@ -7,11 +7,11 @@
 
 use impromptu_firmware::{
     features::{self, Feature, Signals},
-    quadrotor::{DESIRED, REFERENCE},
+    quadrotor::{DESIRED, MEASURED, REFERENCE},
 };
 
 use crate::{
-    flight_log::FlightLog,
+    flight_log::{BODY, FlightLog},
     training::{Dataset, DatasetError, RowMatrix},
 };
 
@@ -32,6 +32,8 @@ pub struct ExampleSettings {
 struct Flown {
     /// Position, velocity, acceleration, yaw of the output at each reference tick.
     output: Vec<[f64; DESIRED]>,
+    /// Angles, body rates, vertical acceleration as they were measured; zero where the log has none.
+    body: Vec<[f64; BODY]>,
     /// Position and velocity reference.
     reference: Vec<[f64; REFERENCE]>,
 }
@@ -48,7 +50,10 @@ impl Signals for Flown {
         self.at(&self.output, tick, channel)
     }
     fn measured(&self, tick: i32, channel: usize) -> f32 {
-        self.at(&self.output, tick, channel)
+        match channel.checked_sub(MEASURED - BODY) {
+            None => self.at(&self.output, tick, channel),
+            Some(channel) => self.at(&self.body, tick, channel),
+        }
     }
     fn reference(&self, tick: i32, channel: usize) -> f32 {
         self.at(&self.reference, tick, channel)
@@ -120,9 +125,11 @@ fn flown(log: &FlightLog, settings: &ExampleSettings) -> Flown {
         .take(output.len())
         .map(|row| std::array::from_fn(|i| if i < 3 { row.reference_position[i] } else { row.reference_velocity[i - 3] }))
         .collect();
+    let body = log.rows.iter().take(output.len()).map(|row| row.measured_body.unwrap_or_default()).collect::<Vec<_>>();
     let kernel = gaussian(settings.smoothing_s * log.rate_hz);
     output = smoothed(&output, &kernel);
     reference = smoothed(&reference, &kernel);
+    let body = smoothed(&body, &kernel);
     for tick in 0..output.len() {
         let (before, after) = (tick.saturating_sub(1), (tick + 1).min(output.len() - 1));
         let step = (after - before).max(1) as f64 / log.rate_hz;
@@ -130,7 +137,7 @@ fn flown(log: &FlightLog, settings: &ExampleSettings) -> Flown {
             output[tick][6 + axis] = (output[after][3 + axis] - output[before][3 + axis]) / step;
         }
     }
-    Flown { output, reference }
+    Flown { output, body, reference }
 }
 
 /// Weights of a Gaussian of that many ticks of standard deviation, from its middle outwards; they sum to 1.

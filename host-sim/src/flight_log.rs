@@ -10,7 +10,12 @@
 
 use std::{fs::File, io, ops::Range, path::Path};
 
+use impromptu_firmware::quadrotor::MEASURED;
+
 use crate::trajectory::Sample;
+
+/// Measured channels behind position and velocity.
+pub const BODY: usize = MEASURED - 6;
 
 /// One reference tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -27,6 +32,8 @@ pub struct LogRow {
     pub measured_position: [f64; 3],
     /// Velocity as the loop was told, m/s.
     pub measured_velocity: [f64; 3],
+    /// Roll, pitch, yaw (rad), body rates (rad/s) and vertical acceleration (m/s²) as the add-on was told, where the log has them: CSV has not.
+    pub measured_body: Option<[f64; BODY]>,
     /// True position, m, where somebody knows it.
     pub true_position: Option<[f64; 3]>,
 }
@@ -239,6 +246,7 @@ impl FlightLog {
                 reference_velocity: triple(reference_velocity)?,
                 measured_position: triple(measured_position)?,
                 measured_velocity: triple(measured_velocity)?,
+                measured_body: None,
                 true_position: truth.map(triple).transpose()?,
             };
             if let Some(previous) = rows.last() {
@@ -296,6 +304,7 @@ fn between(a: &LogRow, b: &LogRow, time: f64) -> LogRow {
         reference_velocity: vector(a.reference_velocity, b.reference_velocity),
         measured_position: vector(a.measured_position, b.measured_position),
         measured_velocity: vector(a.measured_velocity, b.measured_velocity),
+        measured_body: a.measured_body.zip(b.measured_body).map(|(a, b)| std::array::from_fn(|i| scalar(a[i], b[i]))),
         true_position: a.true_position.zip(b.true_position).map(|(a, b)| vector(a, b)),
     }
 }

@@ -6,7 +6,10 @@ use clap::{Args, Subcommand};
 use super::{Session, output::table};
 use crate::{
     report::{render_study, write_page},
-    study,
+    study::{
+        self,
+        quadrotor::{self, QuadrotorSettings},
+    },
 };
 
 /// Arguments of `study`.
@@ -17,11 +20,25 @@ pub(super) struct Study {
 }
 
 #[derive(Debug, Subcommand)]
-enum Subject {}
+enum Subject {
+    /// 12 and 36 inputs, reference points, training signals, rates, sizes, 30 strokes (Insights 2 and 3).
+    Quadrotor {
+        /// Few flights and epochs: other numbers, in a fraction of the time.
+        #[arg(long)]
+        quick: bool,
+    },
+}
 
 impl Study {
-    pub(super) fn run(self, _: &Session) -> Result<()> {
-        match self.subject {}
+    pub(super) fn run(self, session: &Session) -> Result<()> {
+        match self.subject {
+            Subject::Quadrotor { quick } => {
+                let settings = if quick { QuadrotorSettings::quick() } else { QuadrotorSettings::default() };
+                let settings = QuadrotorSettings { seed: session.configuration.seed(), ..settings };
+                let found = quadrotor::run(&settings, &session.command, &|text| session.console.note(text))?;
+                show(session, "quadrotor", &found)
+            }
+        }
     }
 }
 

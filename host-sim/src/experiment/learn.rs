@@ -84,6 +84,19 @@ pub struct Rows {
     pub count: usize,
 }
 
+impl Rows {
+    /// Of a training set.
+    pub fn of(training: &Dataset) -> Self {
+        Self {
+            calibration: calibration(training),
+            envelope: envelope(training),
+            label_range: label_range(training),
+            data_crc: data_crc(training),
+            count: training.rows(),
+        }
+    }
+}
+
 /// Learns from logs of the baseline; every fourth log is kept to decide when a training has been long enough. `judge` chooses between
 /// the recipe's candidates, which should be done in flight; without it the kept logs decide by rows.
 ///
@@ -109,13 +122,7 @@ pub fn learn(
     };
     let training = examples(&pick(false), &features, &settings)?;
     let validation = examples(&pick(true), &features, &settings)?;
-    let rows = Rows {
-        calibration: calibration(&training),
-        envelope: envelope(&training),
-        label_range: label_range(&training),
-        data_crc: data_crc(&training),
-        count: training.rows(),
-    };
+    let rows = Rows::of(&training);
     let ridge = Ridge::fit(&training, recipe.ridge_penalty)?.to_network();
     let mut candidates = Vec::new();
     for &weight_decay in &recipe.weight_decays {

@@ -154,6 +154,9 @@ impl Default for LaneRecipe {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Validate)]
 #[serde(default, deny_unknown_fields)]
 pub struct Recipe {
+    /// The network's inputs, one by one, instead of the window.
+    #[garde(skip)]
+    pub features: Option<Vec<Feature>>,
     /// First and last offset of the window of desired positions, in sub-rate ticks.
     #[garde(custom(fits_preview(self.divisor)))]
     pub window: [i16; 2],
@@ -216,6 +219,7 @@ impl Default for Recipe {
             shortest_s: 0.0,
         };
         Self {
+            features: None,
             window: [-20, 40],
             window_step: 5,
             divisor: 2,
@@ -243,8 +247,11 @@ impl Default for Recipe {
 }
 
 impl Recipe {
-    /// The network's inputs: desired positions over the window, relative to the present one.
+    /// The network's inputs: those given, or desired positions over the window, relative to the present one.
     pub fn features(&self) -> Vec<Feature> {
+        if let Some(features) = &self.features {
+            return features.clone();
+        }
         let step = self.window_step.max(1);
         window(&[0, 1, 2], self.window[0]..=self.window[1]).filter(|feature| feature.offset % step == 0).collect()
     }

@@ -5,6 +5,7 @@
 
 use impromptu_firmware::{
     flight::{PREVIEW, Settings},
+    quadrotor,
     replay::Recorder,
     types::{State as FirmwareState, Tick},
 };
@@ -80,7 +81,11 @@ impl<'a, S: FlightStack> Pilot<'a, S> {
             let seen = State { position, velocity, ..*state };
             let (position, velocity) = self.sensors.position_and_velocity(&seen);
             self.known.position = Vector3::from(position.map(|value| value as f32));
-            self.known.velocity = Vector3::from(velocity.map(|value| value as f32));
+            let velocity = Vector3::from(velocity.map(|value| value as f32));
+            if tick > 0 {
+                self.known.vertical_acceleration = (velocity.z - self.known.velocity.z) * self.plan.trajectory.rate_hz as f32;
+            }
+            self.known.velocity = velocity;
             let next = self.stack.next_setpoint() as usize;
             if let Some(sample) = self.plan.trajectory.samples.get(next) {
                 let setpoint = setpoint(sample);
@@ -124,6 +129,7 @@ impl<'a, S: FlightStack> Pilot<'a, S> {
             }
         }
         if self.plan.log {
+            let measured = quadrotor::measured(&self.known);
             self.rows.push(LogRow {
                 time: reference_tick as f64 / trajectory.rate_hz,
                 desired: *desired,
@@ -131,6 +137,7 @@ impl<'a, S: FlightStack> Pilot<'a, S> {
                 reference_velocity: reference.velocity.map(f64::from).into(),
                 measured_position: self.known.position.map(f64::from).into(),
                 measured_velocity: self.known.velocity.map(f64::from).into(),
+                measured_body: Some(std::array::from_fn(|channel| f64::from(measured[6 + channel]))),
                 true_position: Some(state.position),
             });
         }
