@@ -1,5 +1,7 @@
 //! `host-sim study`: the paper, row by row.
 
+mod robustness;
+
 use anyhow::Result;
 use clap::{Args, Subcommand};
 
@@ -17,11 +19,22 @@ pub(super) struct Study {
 }
 
 #[derive(Debug, Subcommand)]
-enum Subject {}
+enum Subject {
+    /// What is left of the gain when vehicle, loop and air are not those of the training.
+    Robustness(robustness::Robustness),
+    /// The Monte Carlo run over vehicles by itself, or a part of it.
+    Draws(robustness::Draws),
+    /// Puts the parts of a Monte Carlo run together.
+    Merge(robustness::Merge),
+}
 
 impl Study {
-    pub(super) fn run(self, _: &Session) -> Result<()> {
-        match self.subject {}
+    pub(super) fn run(self, session: &Session) -> Result<()> {
+        match self.subject {
+            Subject::Robustness(command) => command.run(session),
+            Subject::Draws(command) => command.run(session),
+            Subject::Merge(command) => command.run(session),
+        }
     }
 }
 
