@@ -27,6 +27,12 @@ pub(super) fn explain(study: &mut Study, settings: &Settings) {
     );
     study.note(CASE_SECTION, &text);
     study.note(
+        CASE_SECTION,
+        "Drag x4 needs corrections larger than the fast part of the feedback lane may give where errors are large already (its clamp, halved at an \
+         error of `error_scale`); in some of these flights the guard hands a lane over besides. Wider clamps are choices of the recipe: they cost \
+         robustness against delay on some vehicles, which the validation flights tell.",
+    );
+    study.note(
         DEVIATION_SECTION,
         "One quantity off at a time. Mass and thrust leave a sag that the network lane cannot know of; the integral of the feedback lane takes it \
          away as long as it is within its clamp. Wind blows along both horizontal axes, with Dryden gusts of its own strength on top.",
@@ -225,7 +231,7 @@ pub(super) fn draw_effort(study: &mut Study, plant: &Loop, designs: &[Design], b
         study.find(Finding::new(EFFORT_SECTION, &format!("{slug}_{name}"), &[], &what, value, unit));
     };
     for design in designs {
-        let key = format!("effort_{:.0e}", design.effort).replace('-', "_minus_");
+        let key = format!("effort_{:.1e}", design.effort).replace('.', "_").replace('-', "_minus_");
         let with = format!("effort {:.1e}", design.effort);
         for (index, label) in labels.iter().enumerate() {
             let (mean, worst) = design.reductions[index];
