@@ -1,5 +1,7 @@
 //! `host-sim study`: the paper, row by row.
 
+mod robustness;
+
 use anyhow::Result;
 use clap::{Args, Subcommand};
 
@@ -27,6 +29,12 @@ enum Subject {
         #[arg(long)]
         quick: bool,
     },
+    /// What is left of the gain when vehicle, loop and air are not those of the training.
+    Robustness(robustness::Robustness),
+    /// The Monte Carlo run over vehicles by itself, or a part of it.
+    Draws(robustness::Draws),
+    /// Puts the parts of a Monte Carlo run together.
+    Merge(robustness::Merge),
 }
 
 impl Study {
@@ -38,6 +46,9 @@ impl Study {
                 let found = quadrotor::run(&settings, &session.command, &|text| session.console.note(text))?;
                 show(session, "quadrotor", &found)
             }
+            Subject::Robustness(command) => command.run(session),
+            Subject::Draws(command) => command.run(session),
+            Subject::Merge(command) => command.run(session),
         }
     }
 }

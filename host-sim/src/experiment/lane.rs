@@ -181,6 +181,14 @@ fn candidates(recipe: &LaneRecipe, logs: &[FlightLog]) -> Result<Vec<Candidate>,
     }
 }
 
+/// Lanes of all designs of the recipe's grid that exist, from dithered logs, not flown yet; each with its margins.
+///
+/// # Errors
+/// If there is none.
+pub fn lanes(recipe: &LaneRecipe, logs: &[FlightLog]) -> Result<Vec<LaneDescription>, LaneRefusal> {
+    Ok(candidates(recipe, logs)?.into_iter().map(|candidate| candidate.lane).collect())
+}
+
 /// A design for each axis as the firmware stores it: errors of position and velocity, output on the position reference.
 fn describe(designs: &[&LaneDesign; 3], fast_limit: f64, scale: f64, recipe: &LaneRecipe) -> LaneDescription {
     let axes = designs

@@ -4,6 +4,7 @@
 //! the JSON document lacks; *source* Zhou 2017 and the rows of its promises (1 to 31).
 
 pub mod quadrotor;
+pub mod robustness;
 
 use serde::{Deserialize, Serialize};
 

@@ -1,0 +1,177 @@
+//! `host-sim study robustness`, and the Monte Carlo run by itself: `draws` and `merge`.
+
+use std::path::PathBuf;
+
+use anyhow::{Context as _, Result, anyhow};
+use clap::Args;
+use impromptu_firmware::model::Model;
+
+use super::show;
+use crate::{
+    cli::{
+        Session, configuration,
+        model_file::ModelFile,
+        output::write,
+        situation::{Situation, plant},
+    },
+    experiment::{build, demo::Observer as _},
+    study::{
+        Study,
+        robustness::{
+            Settings,
+            draws::{DrawSettings, Ranges, fly_draws, slug},
+            ledger::{Header, Shard, merge},
+            run, spread,
+        },
+    },
+};
+
+/// Arguments of `study robustness`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+A model is built for each vehicle and condition and flown with mass, thrust, drag, delay, disturbance and wind that it was not made for, one at a
+time and, in the Monte Carlo run, all at once; then the design effort of the feedback lane is swept. The draws are kept in the folder
+(draws-*.jsonl): the same command goes on with them.
+
+Examples:
+  host-sim study robustness
+  host-sim study robustness --vehicle crazyflie --condition lab --draws 1000 --format json")]
+pub(super) struct Robustness {
+    /// Vehicles, by name or file.
+    #[arg(long, value_name = "NAME|FILE.toml", default_value = "crazyflie,crazyflie-brushless", value_delimiter = ',')]
+    vehicle: Vec<String>,
+    /// Gains of the position loop.
+    #[arg(long, value_name = "NAME", default_value = "stock")]
+    gains: String,
+    /// Conditions, by name or file.
+    #[arg(long, value_name = "NAME|FILE.toml", default_value = "lab,rough", value_delimiter = ',')]
+    condition: Vec<String>,
+    /// Number of test strokes.
+    #[arg(long, value_name = "N", default_value = "30", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    strokes: u32,
+    #[command(flatten)]
+    draw: Drawn,
+}
+
+/// What is drawn.
+#[derive(Debug, Args)]
+struct Drawn {
+    /// Vehicles that are drawn for each loop.
+    #[arg(long, value_name = "N", default_value = "200", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    draws: u32,
+    /// Strokes that each of them flies.
+    #[arg(long, value_name = "N", default_value = "8", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    draw_strokes: u32,
+    /// From where to where is drawn, as TOML: mass = [0.95, 1.15], thrust, drag, inertia, motor_lag (factors), delay_s, wind.
+    #[arg(long, value_name = "FILE.toml")]
+    ranges: Option<PathBuf>,
+}
+
+impl Drawn {
+    fn ranges(&self) -> Result<Ranges> {
+        let Some(path) = &self.ranges else { return Ok(Ranges::default()) };
+        let ranges: Ranges = configuration::toml(path)?;
+        match ranges.fault() {
+            Some(fault) => Err(anyhow!("{}: {fault}", path.display())),
+            None => Ok(ranges),
+        }
+    }
+}
+
+impl Robustness {
+    pub(super) fn run(self, session: &Session) -> Result<()> {
+        let mut loops = Vec::new();
+        for vehicle in &self.vehicle {
+            for condition in &self.condition {
+                loops.push(plant(vehicle, &self.gains, condition)?);
+            }
+        }
+        let settings = Settings {
+            seed: session.configuration.seed(),
+            loops,
+            strokes: self.strokes as usize,
+            draws: self.draw.draws,
+            draw_strokes: self.draw.draw_strokes as usize,
+            ranges: self.draw.ranges()?,
+            recipe: session.configuration.recipe().clone(),
+            out: session.configuration.folder()?,
+        };
+        let study = run(&settings, &session.command, &session.console)?;
+        session.console.finish();
+        show(session, "robustness", &study)
+    }
+}
+
+/// Arguments of `study draws`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Each draw is another vehicle in another air, flown with the model of the nominal one. A line of JSON for each goes to a file in the folder; the
+same command goes on where it stopped. With --shard a run is shared out, by hand or by a scheduler (SLURM: sbatch --array=1-16):
+
+  host-sim study draws --model model.impromptu --draws 10000 --shard $SLURM_ARRAY_TASK_ID/16 --out draws
+  host-sim study merge draws/draws-*-of-16.jsonl --out draws")]
+pub(super) struct Draws {
+    /// Model file; built for the nominal loop if not given.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    #[command(flatten)]
+    situation: Situation,
+    #[command(flatten)]
+    draw: Drawn,
+    /// The part of the run that is flown, from 1.
+    #[arg(long, value_name = "PART/PARTS", default_value = "1/1")]
+    shard: Shard,
+}
+
+impl Draws {
+    pub(super) fn run(self, session: &Session) -> Result<()> {
+        let (plant, ranges) = (self.situation.plant()?, self.draw.ranges()?);
+        let seed = session.configuration.seed();
+        let bytes = match &self.model {
+            Some(path) => ModelFile::read(path)?.bytes().to_vec(),
+            None => build(session.configuration.recipe(), &plant, seed, &mut |_| {})?.models.int8,
+        };
+        let model = Model::from_bytes(&bytes).with_context(|| match &self.model {
+            Some(path) => format!("{}: refused", path.display()),
+            None => "the model that was built".into(),
+        })?;
+        let settings = DrawSettings::new(&plant, &model, seed, self.draw.draws, self.draw.draw_strokes as usize, ranges);
+        let name = match self.shard {
+            Shard::WHOLE => format!("draws-{}", slug(&settings.nominal)),
+            Shard { part, of } => format!("draws-{}-{part}-of-{of}", slug(&settings.nominal)),
+        };
+        let path = session.configuration.folder()?.join(&name).with_extension("jsonl");
+        let header = Header { settings, shard: self.shard };
+        let console = &session.console;
+        let content = fly_draws(&header, &plant, &model, &path, &|done, of| console.steps(done, of))?;
+        console.finish();
+        console.note(&format!("{}: {} draws, seed {seed}", path.display(), content.draws.len()));
+        let mut study = Study::new("Monte Carlo over vehicles", &session.command, seed);
+        spread::tell(&mut study, &slug(&header.settings.nominal), &content);
+        show(session, &name, &study)
+    }
+}
+
+/// Arguments of `study merge`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Checks that the files are all parts of one run, each once and whole, and writes draws-VEHICLE_GAINS_CONDITION.jsonl: the bytes of a run without --shard.")]
+pub(super) struct Merge {
+    /// Files of `study draws --shard`.
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
+}
+
+impl Merge {
+    pub(super) fn run(self, session: &Session) -> Result<()> {
+        let (bytes, content) = merge(&self.files)?;
+        let settings = &content.header.settings;
+        let name = format!("draws-{}", slug(&settings.nominal));
+        let path = session.configuration.folder()?.join(&name).with_extension("jsonl");
+        write(&path, &bytes)?;
+        session.console.note(&format!("{}: {} draws, seed {}", path.display(), content.draws.len(), settings.seed));
+        let mut study = Study::new("Monte Carlo over vehicles", &session.command, settings.seed);
+        spread::tell(&mut study, &slug(&settings.nominal), &content);
+        show(session, &name, &study)
+    }
+}
