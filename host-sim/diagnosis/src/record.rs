@@ -1,0 +1,212 @@
+//! Records of a channel: what was asked, what was measured, at a uniform rate.
+//!
+//! *in* columns of time, reference and measured value; *out* a [`Record`]; *never* a number that is not finite, nor time that is not
+//! uniform; *source* Zhou 2017, Fig. 1: u and y of the baseline.
+
+use serde::Serialize;
+
+/// A stretch without a gap.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Segment {
+    /// Reference that the loop received, u.
+    pub reference: Vec<f64>,
+    /// Measured output, y; `measured[k]` was sampled when `reference[k]` was handed over, or before.
+    pub measured: Vec<f64>,
+}
+
+/// Stretches of one channel at one rate.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Record {
+    /// Time between samples, s.
+    pub period_s: f64,
+    /// Stretches.
+    pub segments: Vec<Segment>,
+}
+
+/// Why columns are no record.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RecordError {
+    /// Columns of different length.
+    #[error("{time} times, {reference} references, {measured} measured values; every row needs all three")]
+    Lengths {
+        /// Rows of time.
+        time: usize,
+        /// Rows of the reference.
+        reference: usize,
+        /// Rows of the measured value.
+        measured: usize,
+    },
+    /// A number that is not finite.
+    #[error("row {row}: `{column}` is {value}, not a finite number; drop the row or cut the log there")]
+    NotFinite {
+        /// Row, from 0.
+        row: usize,
+        /// Which of the columns.
+        column: &'static str,
+        /// What stands there.
+        value: f64,
+    },
+    /// Time that is not uniform.
+    #[error("row {row}: {found:.4} s after the row before, where {usual:.4} s are usual; resample the log to a uniform rate, or cut it there")]
+    NotUniform {
+        /// Row, from 0.
+        row: usize,
+        /// Time since the row before, s.
+        found: f64,
+        /// Median time between rows, s.
+        usual: f64,
+    },
+    /// Too few rows.
+    #[error("{rows} rows are too few: at least {needed} are needed, better some hundred responses long")]
+    Short {
+        /// Rows found.
+        rows: usize,
+        /// Rows needed.
+        needed: usize,
+    },
+    /// Records at different rates.
+    #[error("one log has {0:.4} s between rows, another {1:.4} s; resample them to one rate")]
+    Rates(f64, f64),
+}
+
+/// Fewest rows of a log.
+pub const FEWEST_ROWS: usize = 60;
+/// Largest deviation of a time step from the usual one, as a share of it.
+const JITTER: f64 = 0.25;
+
+impl Record {
+    /// A record of one stretch; the period is the median step.
+    ///
+    /// # Errors
+    /// Names the first row that is wrong.
+    pub fn new(time: &[f64], reference: &[f64], measured: &[f64]) -> Result<Self, RecordError> {
+        let rows = time.len();
+        if reference.len() != rows || measured.len() != rows {
+            return Err(RecordError::Lengths { time: rows, reference: reference.len(), measured: measured.len() });
+        }
+        for (column, values) in [("time", time), ("reference", reference), ("measured", measured)] {
+            if let Some((row, value)) = values.iter().enumerate().find(|(_, value)| !value.is_finite()) {
+                return Err(RecordError::NotFinite { row, column, value: *value });
+            }
+        }
+        if rows < FEWEST_ROWS {
+            return Err(RecordError::Short { rows, needed: FEWEST_ROWS });
+        }
+        let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let late = steps.clone();
+        steps.sort_by(f64::total_cmp);
+        let usual = steps[steps.len() / 2];
+        if let Some(row) = late.iter().position(|step| usual <= 0.0 || (step - usual).abs() > JITTER * usual) {
+            return Err(RecordError::NotUniform { row: row + 1, found: late[row], usual });
+        }
+        // The mean is exact where the median is one rounded step.
+        let period_s = (time[rows - 1] - time[0]) / (rows - 1) as f64;
+        Ok(Self { period_s, segments: vec![Segment { reference: reference.to_vec(), measured: measured.to_vec() }] })
+    }
+
+    /// All records as one.
+    ///
+    /// # Errors
+    /// If there is none, or their rates differ.
+    pub fn joined(records: impl IntoIterator<Item = Self>) -> Result<Self, RecordError> {
+        let mut records = records.into_iter();
+        let mut all = records.next().ok_or(RecordError::Short { rows: 0, needed: FEWEST_ROWS })?;
+        for record in records {
+            if (record.period_s / all.period_s - 1.0).abs() > 0.02 {
+                return Err(RecordError::Rates(all.period_s, record.period_s));
+            }
+            all.segments.extend(record.segments);
+        }
+        Ok(all)
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.segments.iter().map(|segment| segment.reference.len()).sum()
+    }
+
+    /// Whether there is no sample.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The record at every `divisor`-th sample. Both columns go through the same zero-phase mean of `divisor` samples first, which
+    /// leaves the relation of one to the other as it is and takes away what the slower rate cannot show.
+    #[must_use]
+    pub fn slower(&self, divisor: usize) -> Self {
+        if divisor <= 1 {
+            return self.clone();
+        }
+        let segments = self.segments.iter().map(|segment| Segment {
+            reference: decimated(&segment.reference, divisor),
+            measured: decimated(&segment.measured, divisor),
+        });
+        Self { period_s: self.period_s * divisor as f64, segments: segments.collect() }
+    }
+
+    /// The first stretches, `samples` at most and one at least.
+    #[must_use]
+    pub fn shorter(mut self, samples: usize) -> Self {
+        let mut count = 0;
+        self.segments.retain(|segment| {
+            let fits = count == 0 || count + segment.reference.len() <= samples;
+            count += if fits { segment.reference.len() } else { 0 };
+            fits
+        });
+        self
+    }
+}
+
+fn decimated(values: &[f64], divisor: usize) -> Vec<f64> {
+    // The half weights at the ends of an even mean keep it centred.
+    let half = divisor as f64 / 2.0;
+    let reach = half.floor() as usize;
+    (0..values.len())
+        .step_by(divisor)
+        .map(|centre| {
+            let (first, last) = (centre.saturating_sub(reach), (centre + reach).min(values.len() - 1));
+            // A mean that is cut off on one side would be late or early there.
+            let reach = (centre - first).min(last - centre);
+            let weight = |at: usize| if divisor.is_multiple_of(2) && at.abs_diff(centre) == divisor / 2 { 0.5 } else { 1.0 };
+            let range = centre - reach..=centre + reach;
+            let total: f64 = range.clone().map(weight).sum();
+            range.map(|at| weight(at) * values[at]).sum::<f64>() / total
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn time(rows: usize) -> Vec<f64> {
+        (0..rows).map(|row| row as f64 * 0.01).collect()
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_log_is_named() {
+        let good = vec![0.5; 100];
+        assert_eq!(Record::new(&time(20), &good[..20], &good[..20]), Err(RecordError::Short { rows: 20, needed: 60 }));
+        let mut bad = good.clone();
+        bad[7] = f64::NAN;
+        let message = Record::new(&time(100), &good, &bad).unwrap_err().to_string();
+        assert!(message.contains("row 7") && message.contains("`measured`"), "{message}");
+        let mut jumping = time(100);
+        jumping.iter_mut().skip(30).for_each(|value| *value += 0.2);
+        let message = Record::new(&jumping, &good, &good).unwrap_err().to_string();
+        assert!(message.contains("row 30") && message.contains("resample"), "{message}");
+        assert!(matches!(Record::new(&time(100), &good[1..], &good), Err(RecordError::Lengths { .. })));
+    }
+
+    proptest! {
+        #[test]
+        fn a_straight_line_stays_one_at_any_rate(slope in -3.0f64..3.0, divisor in 1usize..12) {
+            let values: Vec<f64> = (0..200).map(|row| slope * f64::from(row)).collect();
+            let record = Record::new(&time(200), &values, &values).unwrap().slower(divisor);
+            for (index, value) in record.segments[0].reference.iter().enumerate() {
+                prop_assert!((value - slope * (index * divisor) as f64).abs() < 1e-9);
+            }
+        }
+    }
+}
