@@ -45,7 +45,9 @@ pub enum DiagnosisError {
     #[error("no excitation: the reference does not move; log steps of random height, or several tones")]
     NoExcitation,
     /// The reference holds too few tones.
-    #[error("too little excitation: the reference tells {order} coefficients apart, as {tones} sine(s) would, and {needed} are needed; log steps of random height, or five tones or more")]
+    #[error(
+        "too little excitation: the reference tells {order} coefficients apart, as {tones} sine(s) would, and {needed} are needed; log steps of random height, or five tones or more"
+    )]
     FewTones {
         /// Coefficients told apart.
         order: usize,
@@ -58,7 +60,9 @@ pub enum DiagnosisError {
     #[error("no answer: the measured value does not move although the reference does; check which column is which")]
     NoAnswer,
     /// Nothing explains the record.
-    #[error("no stable linear model explains the log (best: {percent:.0} % of the measured variance); check which column is which, cut out take-off, landing and failures, or log with larger amplitude")]
+    #[error(
+        "no stable linear model explains the log (best: {percent:.0} % of the measured variance); check which column is which, cut out take-off, landing and failures, or log with larger amplitude"
+    )]
     Unexplained {
         /// Share explained by the best model, %.
         percent: f64,
@@ -72,7 +76,9 @@ pub enum DiagnosisError {
         rate: f64,
     },
     /// At the sub-rate the record is too short.
-    #[error("{rows} rows at the sub-rate of {sub_rate_hz:.2} Hz are too few: at least {needed} are needed; log longer, or ask for a higher --sub-rate")]
+    #[error(
+        "{rows} rows at the sub-rate of {sub_rate_hz:.2} Hz are too few: at least {needed} are needed; log longer, or ask for a higher --sub-rate"
+    )]
     Short {
         /// Rows at the sub-rate.
         rows: usize,
@@ -169,7 +175,9 @@ pub fn diagnose(record: &Record, settings: &Settings) -> Result<Diagnosis, Diagn
     if properties.explained < LEAST_EXPLAINED {
         return Err(DiagnosisError::Unexplained { percent: 100.0 * properties.explained });
     }
-    let coverage = excitation::coverage(record, properties.bandwidth_hz.value);
+    // The mean before decimation leaves zeros at half the sub-rate that are its own, not the loop's.
+    let trusted_hz = if divisor > 1 { 0.25 * sub_rate_hz } else { 0.5 * sub_rate_hz };
+    let coverage = excitation::coverage(record, properties.bandwidth_hz.value, trusted_hz);
     let gates = Gates::of(&properties, &coverage);
     let features = if gates.unit_gain == Gate::Passed { Features::Relative } else { Features::Absolute };
     let seed = settings.seed;

@@ -103,16 +103,16 @@ pub fn band(record: &Record) -> f64 {
     0.5 / record.period_s
 }
 
-/// What the record shows of a loop with that bandwidth, Hz.
-pub fn coverage(record: &Record, bandwidth_hz: f64) -> Coverage {
+/// What the record shows of a loop with that bandwidth, Hz; nothing above `trusted_hz` counts.
+pub fn coverage(record: &Record, bandwidth_hz: f64, trusted_hz: f64) -> Coverage {
     let spectra = Spectra::new(record, window(record));
     let coherent = |line: &(f64, f64, Complex<f64>)| line.2.norm_sqr() > COHERENT * line.0 * line.1 && line.0 > 0.0;
-    let inside = ((bandwidth_hz / spectra.spacing_hz) as usize).clamp(1, spectra.lines.len());
+    let inside = ((bandwidth_hz.min(trusted_hz) / spectra.spacing_hz) as usize).clamp(1, spectra.lines.len());
     let seen = spectra.lines[..inside].iter().filter(|line| coherent(line)).count();
     let highest = spectra.lines.iter().rposition(coherent).map_or(0, |index| index + 1);
     Coverage {
         share: seen as f64 / inside as f64,
-        highest_hz: highest as f64 * spectra.spacing_hz,
+        highest_hz: (highest as f64 * spectra.spacing_hz).min(trusted_hz),
         order: order_of_excitation(record),
     }
 }

@@ -181,7 +181,7 @@ impl Whitened {
             if found.as_ref().is_none_or(|(least, _)| cost < *least) {
                 found = Some((cost, coefficients(&model)));
             }
-            if before.iter().zip(&denominator).all(|(a, b)| (a - b).abs() < 1e-7) {
+            if before.iter().zip(&denominator).all(|(a, b)| (a - b).abs() < 1e-5) {
                 break;
             }
         }
@@ -239,7 +239,7 @@ impl Whitened {
                 let trial = model.with(&(coefficients(&model) + step.coefficients));
                 let trial_cost = if is_stable(&trial.denominator) { self.cost(&trial) } else { f64::INFINITY };
                 if trial_cost < cost {
-                    moved = cost - trial_cost > 1e-7 * cost;
+                    moved = cost - trial_cost > 1e-6 * cost;
                     (model, cost) = (trial, trial_cost);
                     damping = (damping * 0.2).max(1e-12);
                     break;

@@ -47,7 +47,9 @@ pub enum RecordError {
         value: f64,
     },
     /// Time that is not uniform.
-    #[error("row {row}: {found:.4} s after the row before, where {usual:.4} s are usual; resample the log to a uniform rate, or cut it there")]
+    #[error(
+        "row {row}: {found:.4} s after the row before, where {usual:.4} s are usual; resample the log to a uniform rate, or cut it there"
+    )]
     NotUniform {
         /// Row, from 0.
         row: usize,

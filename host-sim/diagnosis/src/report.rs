@@ -4,7 +4,7 @@ use crate::{
     Diagnosis,
     add_on::Features,
     properties::{Interval, RelativeDegree, THRESHOLD},
-    verdict::{Gate, LEAST_REDUCTION, Verdict, zeros_in_band},
+    verdict::{FAR, Gate, LEAST_REDUCTION, Verdict, judged_zeros},
 };
 
 impl Diagnosis {
@@ -14,7 +14,9 @@ impl Diagnosis {
         let reduction = percent(prediction.reduction_percent);
         let mut text = self.verdict.words().to_owned();
         match self.verdict {
-            Verdict::WillHelp => text += &format!(": stable inverse, gain of one; predicted reduction of the RMS error {reduction}"),
+            Verdict::WillHelp => {
+                text += &format!(": stable inverse, gain of one; predicted reduction of the RMS error {reduction}")
+            }
             Verdict::WillHelpWithoutDifferenceLearning => {
                 let why = self.gates.unit_gain.why().unwrap_or_default();
                 text += &format!(": {why}; predicted reduction of the RMS error {reduction}");
@@ -90,20 +92,34 @@ impl Diagnosis {
         lines.push(line("steady-state gain", interval(properties.gain, 3)));
         lines.push(line("output at zero", format!("{} {unit}", interval(properties.offset, 4))));
         lines.push(line("initial reversal", self.reversal_text()));
-        let inside = |re: f64, im: f64| zeros_in_band(properties, &self.coverage).any(|zero| (zero.re, zero.im) == (re, im));
+        let inside = |re: f64, im: f64| judged_zeros(properties, &self.coverage).any(|zero| (zero.re, zero.im) == (re, im));
         let zeros = properties.zeros.iter().map(|zero| {
-            let seen = if inside(zero.re, zero.im) { "" } else { ", beyond what the log excites: not judged" };
+            let seen = if inside(zero.re, zero.im) {
+                ""
+            } else {
+                match zero.magnitude.value {
+                    FAR.. => ", so far out that it is one more tick of dead time",
+                    _ => ", faster than what the log excites: not judged",
+                }
+            };
             format!("{}{seen}", zero.words())
         });
         let zeros: Vec<String> = zeros.collect();
         lines.push(line("zeros", if zeros.is_empty() { "none".into() } else { zeros.join("; ") }));
         let poles = self.model.poles().iter().map(|pole| format!("{:.3}", pole.norm())).collect::<Vec<_>>().join(", ");
         lines.push(line("poles", format!("|z| {poles}")));
-        lines.push(line("lag of slow signals", format!("{} s; settles in {:.2} s", interval(properties.lag_s, 3), properties.settling_s)));
+        lines.push(line(
+            "lag of slow signals",
+            format!("{} s; settles in {:.2} s", interval(properties.lag_s, 3), properties.settling_s),
+        ));
         lines.push(line("bandwidth (-3 dB)", format!("{} Hz", interval(properties.bandwidth_hz, 2))));
         lines.push(line(
             "noise floor",
-            format!("{:.3e} {unit} RMS; the model explains {:.2} % of the measured variance", properties.noise, 100.0 * properties.explained),
+            format!(
+                "{:.3e} {unit} RMS; the model explains {:.2} % of the measured variance",
+                properties.noise,
+                100.0 * properties.explained
+            ),
         ));
         lines.push(line(
             "excitation",
@@ -139,7 +155,11 @@ impl Diagnosis {
 }
 
 fn degree(degree: RelativeDegree) -> String {
-    if degree.low == degree.high { degree.value.to_string() } else { format!("{} ({} … {})", degree.value, degree.low, degree.high) }
+    if degree.low == degree.high {
+        degree.value.to_string()
+    } else {
+        format!("{} ({} … {})", degree.value, degree.low, degree.high)
+    }
 }
 
 fn interval(interval: Interval, decimals: usize) -> String {

@@ -119,22 +119,30 @@ fn unit_gain(properties: &Properties) -> Gate {
     }
 }
 
-/// Zeros at frequencies that the record shows. At faster ones neither the log nor a smooth trajectory asks anything of the inverse.
-pub fn zeros_in_band<'a>(properties: &'a Properties, coverage: &Coverage) -> impl Iterator<Item = &'a Zero> + use<'a> {
+/// A zero further out than this is a dead time that is a tick longer, up to a tenth of the first coefficient: preview undoes it.
+pub const FAR: f64 = 10.0;
+
+/// Zeros that are judged: at frequencies that the record shows (at faster ones neither the log nor a smooth trajectory asks anything of the
+/// inverse) and not [`FAR`] out.
+pub fn judged_zeros<'a>(properties: &'a Properties, coverage: &Coverage) -> impl Iterator<Item = &'a Zero> + use<'a> {
     let highest = 1.02 * coverage.highest_hz;
-    properties.zeros.iter().filter(move |zero| zero.frequency_hz <= highest)
+    properties.zeros.iter().filter(move |zero| zero.frequency_hz <= highest && zero.magnitude.value < FAR)
 }
 
 fn stable_inverse(properties: &Properties, coverage: &Coverage) -> Gate {
     let list = |place: Place| {
-        let zeros = zeros_in_band(properties, coverage).filter(|zero| zero.place == place);
+        let zeros = judged_zeros(properties, coverage).filter(|zero| zero.place == place);
         zeros.map(Zero::words).collect::<Vec<_>>().join(", ")
     };
     let (outside, undecided) = (list(Place::Outside), list(Place::Undecided));
     if !outside.is_empty() {
-        Gate::Failed(format!("zero outside of the unit circle, z = {outside}: the inverse is unstable, its reference grows without bound"))
+        Gate::Failed(format!(
+            "zero outside of the unit circle, z = {outside}: the inverse is unstable, its reference grows without bound"
+        ))
     } else if !undecided.is_empty() {
-        Gate::Undecided(format!("zero z = {undecided} may lie on either side of the unit circle; a longer or quieter log decides"))
+        Gate::Undecided(format!(
+            "zero z = {undecided} may lie on either side of the unit circle; a longer or quieter log decides"
+        ))
     } else {
         Gate::Passed
     }
