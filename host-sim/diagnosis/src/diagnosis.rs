@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::{
     add_on::Features,
     excitation::{self, Coverage},
-    identification::identify,
+    identification::{Identified, identify},
     prediction::{Prediction, predict, window},
     properties::Properties,
     record::{FEWEST_ROWS, Record, RecordError},
@@ -131,19 +131,38 @@ const LEAST_ORDER: usize = 5;
 /// Least share of the measured variance that a model has to explain.
 const LEAST_EXPLAINED: f64 = 0.3;
 
-/// Diagnoses a record.
+/// What is known of a channel before anything is predicted.
+#[derive(Clone, Debug)]
+pub struct Assessment {
+    /// Rate of the record, Hz.
+    pub rate_hz: f64,
+    /// Rate at which the channel was identified, Hz.
+    pub sub_rate_hz: f64,
+    /// The record at that rate.
+    pub record: Record,
+    /// Model and covariance.
+    pub identified: Identified,
+    /// Models that could as well be the true one.
+    pub draws: Vec<TransferFunction>,
+    /// Properties.
+    pub properties: Properties,
+    /// Excitation.
+    pub coverage: Coverage,
+    /// Gates.
+    pub gates: Gates,
+}
+
+/// Identifies a channel and passes it through the gates, without a prediction.
 ///
 /// # Errors
 /// If the record is too short, excites nothing, or no model explains it.
-pub fn diagnose(record: &Record, settings: &Settings) -> Result<Diagnosis, DiagnosisError> {
+pub fn assess(record: &Record, settings: &Settings) -> Result<Assessment, DiagnosisError> {
     let rate_hz = 1.0 / record.period_s;
-    let moves = |values: &dyn Fn(&crate::record::Segment) -> Vec<f64>| {
-        record.segments.iter().any(|segment| values(segment).windows(2).any(|pair| pair[0] != pair[1]))
-    };
-    if !moves(&|segment| segment.reference.clone()) {
+    let moves = |values: &[f64]| values.windows(2).any(|pair| pair[0] != pair[1]);
+    if !record.segments.iter().any(|segment| moves(&segment.reference)) {
         return Err(DiagnosisError::NoExcitation);
     }
-    if !moves(&|segment| segment.measured.clone()) {
+    if !record.segments.iter().any(|segment| moves(&segment.measured)) {
         return Err(DiagnosisError::NoAnswer);
     }
     let divisor = match settings.sub_rate_hz {
@@ -154,20 +173,20 @@ pub fn diagnose(record: &Record, settings: &Settings) -> Result<Diagnosis, Diagn
             (rate_hz / (SAMPLES_A_PERIOD * band)).floor().max(1.0) as usize
         }
     };
-    let record = &record.slower(divisor).shorter(MOST_SAMPLES);
+    let record = record.slower(divisor).shorter(MOST_SAMPLES);
     let sub_rate_hz = rate_hz / divisor as f64;
     let shortest = record.segments.iter().map(|segment| segment.reference.len()).min().unwrap_or(0);
     if record.len() < FEWEST_ROWS || shortest < FEWEST_ROWS / 2 {
         return Err(DiagnosisError::Short { rows: record.len(), sub_rate_hz, needed: FEWEST_ROWS });
     }
-    let order = excitation::order_of_excitation(record);
+    let order = excitation::order_of_excitation(&record);
     if order < LEAST_ORDER {
         return Err(match order {
             0 => DiagnosisError::NoExcitation,
             _ => DiagnosisError::FewTones { order, tones: order.div_ceil(2), needed: LEAST_ORDER },
         });
     }
-    let identified = identify(record).ok_or(DiagnosisError::Unexplained { percent: 0.0 })?;
+    let identified = identify(&record).ok_or(DiagnosisError::Unexplained { percent: 0.0 })?;
     let mut random = Xoshiro256PlusPlus::seed_from_u64(settings.seed);
     let draws = identified.draws(settings.draws, &mut random);
     let measured: Vec<&[f64]> = record.segments.iter().map(|segment| segment.measured.as_slice()).collect();
@@ -177,15 +196,24 @@ pub fn diagnose(record: &Record, settings: &Settings) -> Result<Diagnosis, Diagn
     }
     // The mean before decimation leaves zeros at half the sub-rate that are its own, not the loop's.
     let trusted_hz = if divisor > 1 { 0.25 * sub_rate_hz } else { 0.5 * sub_rate_hz };
-    let coverage = excitation::coverage(record, properties.bandwidth_hz.value, trusted_hz);
+    let coverage = excitation::coverage(&record, properties.bandwidth_hz.value, trusted_hz);
     let gates = Gates::of(&properties, &coverage);
+    Ok(Assessment { rate_hz, sub_rate_hz, identified, draws, properties, coverage, gates, record })
+}
+
+/// Diagnoses a record.
+///
+/// # Errors
+/// As [`assess`].
+pub fn diagnose(record: &Record, settings: &Settings) -> Result<Diagnosis, DiagnosisError> {
+    let Assessment { rate_hz, sub_rate_hz, record, identified, draws, properties, coverage, gates } = assess(record, settings)?;
     let features = if gates.unit_gain == Gate::Passed { Features::Relative } else { Features::Absolute };
     let seed = settings.seed;
     let too_short = || DiagnosisError::Short { rows: record.len(), sub_rate_hz, needed: 4 * FEWEST_ROWS };
-    let best = window(record, &identified, features, seed).ok_or_else(too_short)?;
-    let of = |features| predict(record, &identified, &draws, best, features, seed);
+    let best = window(&record, &identified, features, seed).ok_or_else(too_short)?;
+    let of = |features| predict(&record, &identified, &draws, best, features, seed);
     let prediction = of(features).ok_or_else(too_short)?;
-    let recommended = recommended_divisor(&properties, excitation::band(record), record.period_s);
+    let recommended = recommended_divisor(&properties, excitation::band(&record), record.period_s);
     Ok(Diagnosis {
         seed,
         rate_hz,

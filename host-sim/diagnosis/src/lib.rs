@@ -23,6 +23,6 @@ pub mod report;
 pub mod transfer_function;
 pub mod verdict;
 
-pub use diagnosis::{Diagnosis, DiagnosisError, Settings, diagnose};
+pub use diagnosis::{Assessment, Diagnosis, DiagnosisError, Settings, assess, diagnose};
 pub use record::{Record, RecordError};
 pub use verdict::{Gate, Gates, Verdict};

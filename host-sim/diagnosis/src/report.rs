@@ -7,6 +7,9 @@ use crate::{
     verdict::{FAR, Gate, LEAST_REDUCTION, Verdict, judged_zeros},
 };
 
+/// Width of the text, characters.
+const WIDTH: usize = 130;
+
 impl Diagnosis {
     /// The verdict and why, in one sentence or two.
     pub fn verdict_text(&self) -> String {
@@ -38,6 +41,29 @@ impl Diagnosis {
                     );
                 }
             }
+        }
+        text
+    }
+
+    /// The lines as text for a terminal, broken at [`WIDTH`] characters.
+    pub fn text(&self, unit: &str) -> String {
+        let lines = self.lines(unit);
+        let label = lines.iter().map(|[label, _]| label.chars().count()).max().unwrap_or(0) + 2;
+        let mut text = String::new();
+        for [name, words] in lines {
+            let mut column = label;
+            text += &format!("{name:label$}");
+            for word in words.split(' ') {
+                if column + word.chars().count() > WIDTH && column > label {
+                    text += &format!("\n{:label$}", "");
+                    column = label;
+                }
+                text += word;
+                text.push(' ');
+                column += word.chars().count() + 1;
+            }
+            text.truncate(text.trim_end().len());
+            text.push('\n');
         }
         text
     }
