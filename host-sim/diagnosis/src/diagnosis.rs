@@ -125,7 +125,7 @@ const MOST_SAMPLES: usize = 16_000;
 /// Most samples of the record's own rate from which the rate is chosen.
 const GLANCE: usize = 40_000;
 /// Sub-rate in multiples of the band that passes the loop.
-const SAMPLES_A_PERIOD: f64 = 10.0;
+const SAMPLES_A_PERIOD: f64 = 16.0;
 /// Coefficients that the reference has to tell apart.
 const LEAST_ORDER: usize = 5;
 /// Least share of the measured variance that a model has to explain.
@@ -188,7 +188,7 @@ pub fn assess(record: &Record, settings: &Settings) -> Result<Assessment, Diagno
     }
     let identified = identify(&record).ok_or(DiagnosisError::Unexplained { percent: 0.0 })?;
     let mut random = Xoshiro256PlusPlus::seed_from_u64(settings.seed);
-    let draws = identified.draws(settings.draws, &mut random);
+    let draws = identified.draws(&record, settings.draws, &mut random);
     let measured: Vec<&[f64]> = record.segments.iter().map(|segment| segment.measured.as_slice()).collect();
     let properties = Properties::of(&identified, &draws, &measured, record.period_s);
     if properties.explained < LEAST_EXPLAINED {

@@ -88,15 +88,21 @@ fn window(record: &Record) -> usize {
     (longest / 5).clamp(16, 512) & !1
 }
 
-/// Frequency, Hz, below which 95 % of what passes the loop lies: magnitude of the cross spectrum of increments.
+/// Whether a line is the reference's work rather than the noise's.
+fn coherent(line: &(f64, f64, Complex<f64>)) -> bool {
+    line.2.norm_sqr() > COHERENT * line.0 * line.1 && line.0 > 0.0
+}
+
+/// Frequency, Hz, below which 95 % of what passes the loop lies: magnitude of the cross spectrum of increments, of coherent lines. Half the
+/// record's rate if there are none.
 pub fn band(record: &Record) -> f64 {
-    // A coarse look at the head of the record is enough to choose a rate.
     let spectra = Spectra::new(record, window(record));
-    let total: f64 = spectra.lines.iter().map(|line| line.2.norm()).sum();
+    let passing = |line: &(f64, f64, Complex<f64>)| if coherent(line) { line.2.norm() } else { 0.0 };
+    let total: f64 = spectra.lines.iter().map(passing).sum();
     let mut sum = 0.0;
     for (index, line) in spectra.lines.iter().enumerate() {
-        sum += line.2.norm();
-        if sum >= 0.95 * total {
+        sum += passing(line);
+        if total > 0.0 && sum >= 0.95 * total {
             return (index + 1) as f64 * spectra.spacing_hz;
         }
     }
@@ -106,7 +112,6 @@ pub fn band(record: &Record) -> f64 {
 /// What the record shows of a loop with that bandwidth, Hz; nothing above `trusted_hz` counts.
 pub fn coverage(record: &Record, bandwidth_hz: f64, trusted_hz: f64) -> Coverage {
     let spectra = Spectra::new(record, window(record));
-    let coherent = |line: &(f64, f64, Complex<f64>)| line.2.norm_sqr() > COHERENT * line.0 * line.1 && line.0 > 0.0;
     let inside = ((bandwidth_hz.min(trusted_hz) / spectra.spacing_hz) as usize).clamp(1, spectra.lines.len());
     let seen = spectra.lines[..inside].iter().filter(|line| coherent(line)).count();
     let highest = spectra.lines.iter().rposition(coherent).map_or(0, |index| index + 1);

@@ -22,7 +22,7 @@ use crate::{
 pub struct Identified {
     /// The model.
     pub model: TransferFunction,
-    /// Covariance of numerator, denominator without its first 1, offset, in this order.
+    /// Covariance of numerator, denominator without its first 1, whitened offset, in this order.
     pub covariance: DMatrix<f64>,
     /// Weight of each dead time, in ticks, after the data; they sum to 1.
     pub dead_times: Vec<(usize, f64)>,
@@ -83,16 +83,30 @@ pub fn identify(record: &Record) -> Option<Identified> {
     let weights: Vec<(usize, f64)> =
         (0..=LONGEST_DEAD_TIME + 2).map(|d| (d, (0.5 * (chosen.criterion - least(d))).exp())).collect();
     let total: f64 = weights.iter().map(|(_, weight)| weight).sum();
-    let noise = record.segments.iter().map(|segment| {
-        segment.measured.iter().zip(chosen.model.simulate(&segment.reference)).map(|(y, model)| y - model).collect()
-    });
+    let mut model = chosen.model.clone();
+    level(&mut model, record);
+    let noise = record
+        .segments
+        .iter()
+        .map(|segment| segment.measured.iter().zip(model.simulate(&segment.reference)).map(|(y, model)| y - model).collect());
     Some(Identified {
         noise: noise.collect(),
         dead_times: weights.into_iter().map(|(d, weight)| (d, weight / total)).filter(|(_, weight)| *weight > 1e-4).collect(),
-        model: chosen.model.clone(),
+        model,
         covariance: chosen.covariance.clone(),
         whitening_order: arx.order,
     })
+}
+
+/// The offset that leaves no mean. Whitening takes slow noise away and the constant with it, so that the whitened one is uncertain.
+fn level(model: &mut TransferFunction, record: &Record) {
+    let (mut sum, mut count) = (0.0, 0);
+    for segment in &record.segments {
+        let errors = segment.measured.iter().zip(model.simulate(&segment.reference)).map(|(y, model)| y - model);
+        sum += errors.sum::<f64>();
+        count += segment.measured.len();
+    }
+    model.offset += sum / count.max(1) as f64;
 }
 
 fn best(candidates: &[Candidate]) -> Option<&Candidate> {
@@ -100,8 +114,8 @@ fn best(candidates: &[Candidate]) -> Option<&Candidate> {
 }
 
 impl Identified {
-    /// Models that could as well be the true one: stable draws from the coefficients' distribution.
-    pub fn draws(&self, count: usize, random: &mut impl Rng) -> Vec<TransferFunction> {
+    /// Models that could as well be the true one: stable draws from the coefficients' distribution, each with the offset that suits the record.
+    pub fn draws(&self, record: &Record, count: usize, random: &mut impl Rng) -> Vec<TransferFunction> {
         let size = self.covariance.nrows();
         // A tenth of a millionth more on the diagonal: rounding may have made the matrix indefinite.
         let jittered = &self.covariance + DMatrix::from_diagonal(&self.covariance.diagonal()) * 1e-7;
@@ -113,8 +127,9 @@ impl Identified {
                 break;
             }
             let normal = DVector::from_fn(size, |_, _| StandardNormal.sample(random));
-            let model = self.model.with(&(&centre + &root * normal));
+            let mut model = self.model.with(&(&centre + &root * normal));
             if is_stable(&model.denominator) {
+                level(&mut model, record);
                 draws.push(model);
             }
         }

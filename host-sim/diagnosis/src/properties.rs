@@ -68,7 +68,7 @@ pub struct Zero {
     pub im: f64,
     /// Distance from the origin.
     pub magnitude: Interval,
-    /// Frequency, Hz.
+    /// Natural frequency |ln z| / 2π, Hz: how fast what it holds grows or dies, or turns.
     pub frequency_hz: f64,
     /// With respect to the unit circle.
     pub place: Place,
@@ -193,7 +193,7 @@ fn zeros(model: &TransferFunction, draws: &[TransferFunction], period_s: f64) ->
                 re: zero.re,
                 im: zero.im,
                 magnitude: Interval::of(zero.norm(), magnitudes),
-                frequency_hz: zero.arg().abs() / (std::f64::consts::TAU * period_s),
+                frequency_hz: zero.ln().norm() / (std::f64::consts::TAU * period_s),
                 place,
             }
         })

@@ -1,7 +1,7 @@
 //! Records of a channel: what was asked, what was measured, at a uniform rate.
 //!
 //! *in* columns of time, reference and measured value; *out* a [`Record`]; *never* a number that is not finite, nor time that is not
-//! uniform; *source* Zhou 2017, Fig. 1: u and y of the baseline.
+//! uniform: a few lost rows are filled, more is refused; *source* Zhou 2017, Fig. 1: u and y of the baseline.
 
 use serde::Serialize;
 
@@ -73,8 +73,12 @@ pub enum RecordError {
 
 /// Fewest rows of a log.
 pub const FEWEST_ROWS: usize = 60;
-/// Largest deviation of a time step from the usual one, as a share of it.
+/// Largest deviation of a regular time step from the usual one, as a share of it.
 const JITTER: f64 = 0.25;
+/// Longest step, in usual ones, that lost rows may leave; the line between its ends fills it.
+const LONGEST_GAP: f64 = 8.5;
+/// Share of steps that may be irregular.
+const MOST_UNEVEN: f64 = 0.03;
 
 impl Record {
     /// A record of one stretch; the period is the median step.
@@ -94,16 +98,25 @@ impl Record {
         if rows < FEWEST_ROWS {
             return Err(RecordError::Short { rows, needed: FEWEST_ROWS });
         }
-        let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        let late = steps.clone();
-        steps.sort_by(f64::total_cmp);
-        let usual = steps[steps.len() / 2];
-        if let Some(row) = late.iter().position(|step| usual <= 0.0 || (step - usual).abs() > JITTER * usual) {
-            return Err(RecordError::NotUniform { row: row + 1, found: late[row], usual });
+        let steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let mut sorted = steps.clone();
+        sorted.sort_by(f64::total_cmp);
+        let usual = sorted[sorted.len() / 2];
+        let even = |step: f64| (step - usual).abs() <= JITTER * usual;
+        let not_uniform = |row: usize| RecordError::NotUniform { row: row + 1, found: steps[row], usual };
+        if let Some(row) = steps.iter().position(|step| usual <= 0.0 || *step <= 0.0 || *step > LONGEST_GAP * usual) {
+            return Err(not_uniform(row));
+        }
+        let uneven = steps.iter().filter(|step| !even(**step)).count();
+        if uneven as f64 > MOST_UNEVEN * steps.len() as f64 {
+            return Err(not_uniform(steps.iter().position(|step| !even(*step)).unwrap_or(0)));
         }
         // The mean is exact where the median is one rounded step.
-        let period_s = (time[rows - 1] - time[0]) / (rows - 1) as f64;
-        Ok(Self { period_s, segments: vec![Segment { reference: reference.to_vec(), measured: measured.to_vec() }] })
+        let regular = || steps.iter().copied().filter(|step| even(*step));
+        let period_s = regular().sum::<f64>() / regular().count() as f64;
+        let segment = Segment { reference: reference.to_vec(), measured: measured.to_vec() };
+        let segment = if uneven == 0 { segment } else { filled(time, &segment, period_s) };
+        Ok(Self { period_s, segments: vec![segment] })
     }
 
     /// All records as one.
@@ -159,6 +172,25 @@ impl Record {
     }
 }
 
+/// The stretch at a uniform rate, by lines between its rows.
+fn filled(time: &[f64], segment: &Segment, period_s: f64) -> Segment {
+    let last = time.len() - 1;
+    let count = ((time[last] - time[0]) / period_s + 1e-6) as usize + 1;
+    let mut row = 0;
+    let mut filled = Segment::default();
+    for tick in 0..count {
+        let now = time[0] + tick as f64 * period_s;
+        while row + 2 < time.len() && time[row + 1] <= now {
+            row += 1;
+        }
+        let share = ((now - time[row]) / (time[row + 1] - time[row])).clamp(0.0, 1.0);
+        let between = |values: &[f64]| values[row] + share * (values[row + 1] - values[row]);
+        filled.reference.push(between(&segment.reference));
+        filled.measured.push(between(&segment.measured));
+    }
+    filled
+}
+
 fn decimated(values: &[f64], divisor: usize) -> Vec<f64> {
     // The half weights at the ends of an even mean keep it centred.
     let half = divisor as f64 / 2.0;
@@ -199,6 +231,15 @@ mod tests {
         let message = Record::new(&jumping, &good, &good).unwrap_err().to_string();
         assert!(message.contains("row 30") && message.contains("resample"), "{message}");
         assert!(matches!(Record::new(&time(100), &good[1..], &good), Err(RecordError::Lengths { .. })));
+    }
+
+    #[test]
+    fn a_few_lost_rows_are_filled() {
+        let kept: Vec<f64> = time(300).into_iter().enumerate().filter(|(row, _)| row % 90 != 50).map(|(_, time)| time).collect();
+        let values: Vec<f64> = kept.iter().map(|time| 3.0 * time).collect();
+        let record = Record::new(&kept, &values, &values).unwrap();
+        assert_eq!(record.len(), 300);
+        assert!(record.segments[0].measured.windows(2).all(|pair| (pair[1] - pair[0] - 0.03).abs() < 1e-9));
     }
 
     proptest! {

@@ -34,7 +34,7 @@ impl Diagnosis {
                     text += &format!(
                         ". Not the inverse, but a window over the desired output alone stays bounded; its predicted reduction is {reduction}"
                     );
-                } else if prediction.reduction_percent.low < LEAST_REDUCTION {
+                } else if prediction.reduction_percent.value < LEAST_REDUCTION {
                     text += &format!(
                         ": there is little to gain; predicted reduction {reduction}, noise alone leaves {:.3e} of {:.3e} RMS",
                         prediction.floor, prediction.baseline.value
@@ -78,6 +78,12 @@ impl Diagnosis {
             if let Gate::Undecided(why) = gate {
                 lines.push(line("undecided", why.clone()));
             }
+        }
+        let reduction = prediction.reduction_percent;
+        if reduction.value >= LEAST_REDUCTION && reduction.low < LEAST_REDUCTION {
+            let why = "the predicted reduction reaches down to harm: the log leaves too many models; a longer or quieter one, or a slower \
+                       --sub-rate, decides";
+            lines.push(line("undecided", why.into()));
         }
         let features = match prediction.features {
             Features::Relative => "relative to now (difference learning)",
@@ -158,7 +164,7 @@ impl Diagnosis {
         lines.push(line(
             "identified from",
             format!(
-                "{} samples at {:.2} Hz (log: {:.2} Hz); intervals hold 95 % of the models that could be true; seed {}",
+                "{} samples at {:.2} Hz (log: {:.2} Hz); intervals hold 95 % of the linear models that could be true; seed {}",
                 self.samples, self.sub_rate_hz, self.rate_hz, self.seed
             ),
         ));

@@ -50,7 +50,7 @@ pub enum Verdict {
 pub const GAIN_TOLERANCE: f64 = 0.03;
 /// Least share of the loop's band that has to be excited.
 const LEAST_COVERAGE: f64 = 0.5;
-/// A predicted reduction whose lower end is below this, %, is none.
+/// A predicted reduction below this, %, is none; one whose interval reaches below is stated as undecided.
 pub const LEAST_REDUCTION: f64 = 5.0;
 
 impl Gates {
@@ -85,7 +85,7 @@ impl Verdict {
     /// The verdict of gates and of a prediction for the features that the gates allow.
     pub fn of(gates: &Gates, prediction: &Prediction) -> Self {
         let failed = |gate: &Gate| matches!(gate, Gate::Failed(_));
-        if failed(&gates.stable_inverse) || failed(&gates.excitation) || prediction.reduction_percent.low < LEAST_REDUCTION {
+        if failed(&gates.stable_inverse) || failed(&gates.excitation) || prediction.reduction_percent.value < LEAST_REDUCTION {
             Self::WillNot
         } else if gates.unit_gain == Gate::Passed {
             Self::WillHelp

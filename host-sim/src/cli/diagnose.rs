@@ -31,7 +31,7 @@ Log steps of random height, or five tones and more, over the band that will be f
 measured is what the loop was told; if that is old, say how old with --delay-ms.
 
 Relative degree, gain, zeros and bandwidth are those of the reference to the measured value at the sub-rate. Intervals hold 95 % of the
-models that could be the true one. The predicted reduction is that of a linear window over the desired output, trained on such a log and
+linear models that could be the true one; what is not linear they do not know. The predicted reduction is that of a linear window over the desired output, trained on such a log and
 flown along signals of the log's kind: measured errors, so with the noise in them.
 
 Examples:
@@ -43,8 +43,8 @@ pub(super) struct Diagnose {
     #[arg(long, value_name = "FILE.csv", num_args = 1.., required_unless_present = "vehicle", conflicts_with = "vehicle")]
     log: Vec<PathBuf>,
     /// Columns of time in s, reference and measured value.
-    #[arg(long, value_name = "TIME,REFERENCE,MEASURED", value_delimiter = ',', num_args = 3, requires = "log")]
-    columns: Vec<String>,
+    #[arg(long, value_name = "TIME,REFERENCE,MEASURED", requires = "log", value_parser = three)]
+    columns: Option<Columns>,
     /// Vehicle (name or TOML file) that is tested in the simulator, in the place of logs.
     #[arg(long, value_name = "NAME|FILE.toml")]
     vehicle: Option<String>,
@@ -66,6 +66,15 @@ pub(super) struct Diagnose {
     /// Rate of the add-on, Hz: that of which the relative degree is meant; chosen from the band of the log if not given.
     #[arg(long, value_name = "HZ")]
     sub_rate: Option<f64>,
+}
+
+/// Names of three columns.
+#[derive(Clone, Debug)]
+struct Columns([String; 3]);
+
+fn three(text: &str) -> Result<Columns, String> {
+    let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
+    names.try_into().map(Columns).map_err(|_| "expected three names of columns with commas between them".into())
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -146,11 +155,10 @@ impl Diagnose {
 
     /// Channels of the logs, those of one name joined.
     fn channels(&self) -> Result<Vec<Channel>> {
-        let columns: Option<[String; 3]> = self.columns.clone().try_into().ok();
         let age_s = self.delay_ms.unwrap_or(0.0) / 1e3;
         let mut joined: Vec<Channel> = Vec::new();
         for path in &self.log {
-            for channel in read(path, columns.as_ref(), age_s).context("--log")? {
+            for channel in read(path, self.columns.as_ref().map(|columns| &columns.0), age_s).context("--log")? {
                 match joined.iter_mut().find(|known| known.name == channel.name) {
                     Some(known) => {
                         let record = Record::joined([known.record.clone(), channel.record]);
