@@ -3,6 +3,7 @@
 //!
 //! SI units; world frame ENU (z up), body frame FLU, Hamilton quaternion body to world; f64 here, f32 in the firmware.
 
+pub mod channel;
 pub mod cli;
 pub mod condition;
 pub mod emulator;

@@ -6,6 +6,7 @@
 mod collect;
 mod configuration;
 mod demo;
+mod diagnose;
 mod evaluate;
 mod fly;
 mod model_file;
@@ -46,6 +47,7 @@ Examples:
   host-sim trajectory --list
   host-sim collect --condition lab --flights 20 --out logs
   host-sim collect --condition lab --dither 0.01 --out dithered
+  host-sim diagnose --log logs/*.csv
   host-sim train --log logs/*.csv --dithered dithered/*.csv --vehicle crazyflie --out models
   host-sim fly --model models/model.impromptu --trajectory figure8 --log figure8.csv
   host-sim evaluate --model models/model.impromptu --speed 1,1.7
@@ -90,6 +92,8 @@ struct Global {
 enum Command {
     /// Flies the baseline and writes flight logs to learn from.
     Collect(collect::Collect),
+    /// Says of a loop, from its logs or from a test in the simulator, whether an add-on will help, and how much.
+    Diagnose(diagnose::Diagnose),
     /// Makes a model from flight logs, simulated or real.
     Train(train::Train),
     /// Flies a trajectory with the baseline and with a model.
@@ -168,6 +172,7 @@ fn execute(arguments: Arguments, console: &Console, command: String) -> Result<(
     match arguments.command {
         None => demo::run(&session),
         Some(Command::Collect(command)) => command.run(&session),
+        Some(Command::Diagnose(command)) => command.run(&session),
         Some(Command::Train(command)) => command.run(&session),
         Some(Command::Fly(command)) => command.run(&session),
         Some(Command::Evaluate(command)) => command.run(&session),

@@ -23,8 +23,8 @@ use super::{
 };
 use crate::{
     experiment::{
-        Candidates, Judge, Learned, Loop, Purpose, Recipe, Rows, best_in_flight, demo::Observer as _, derived, describe, learn,
-        monitor, promise, smoothing, validation_strokes, write_model_files,
+        AxisGates, Candidates, Judge, Learned, Loop, Purpose, Recipe, Rows, best_in_flight, check_gates, demo::Observer as _,
+        derived, describe, learn, monitor, promise, smoothing, validation_strokes, write_model_files,
     },
     flight_log::FlightLog,
     training::Progress,
@@ -58,6 +58,9 @@ pub(super) struct Train {
     /// Name of the model and of its files.
     #[arg(long, default_value = "model", value_parser = file_name)]
     name: String,
+    /// Train although a gate of `diagnose` failed; the model's remarks say so.
+    #[arg(long)]
+    force: bool,
     /// Recipe as TOML, in the place of the configuration's `[recipe]`.
     #[arg(long, value_name = "FILE.toml")]
     recipe: Option<PathBuf>,
@@ -80,7 +83,17 @@ struct Trained {
     feedback_lane: Option<String>,
     /// Why there is no feedback lane, or `null`.
     refusal: Option<String>,
+    /// Gates of each axis.
+    gates: Vec<AxisGates>,
+    /// What --force overrode, or `null`.
+    overridden: Option<String>,
     files: Vec<PathBuf>,
+}
+
+/// Gates that the logs went through.
+struct Passed {
+    axes: Vec<AxisGates>,
+    overridden: Option<String>,
 }
 
 /// The logs' loop: what of it is known.
@@ -106,8 +119,9 @@ impl Train {
         let read = |paths: &[PathBuf]| paths.iter().map(|path| FlightLog::read(path, rate_hz)).collect::<Result<Vec<_>, _>>();
         let (logs, dithered) = (read(&self.log)?, read(&self.dithered)?);
         check_movement(&logs)?;
-        let folder = session.configuration.folder()?;
         session.console.note(&format!("seed {seed}"));
+        let gates = self.pass_gates(session, &logs, origin.delay_s, seed)?;
+        let folder = session.configuration.folder()?;
 
         session.console.stage(&format!("training on {} logs", logs.len()));
         let validation = match &origin.plant {
@@ -136,11 +150,14 @@ impl Train {
         let lane = feedback::choose(session, &recipe, origin.plant.as_ref(), identification, &validation, &|lane| {
             encode(&describe(Some(lane), ""), Some(&learned.quantised), Precision::Int8, &learned.rows.calibration)
         });
-        let (remarks, design, refusal) = match &lane {
+        let (mut remarks, design, refusal) = match &lane {
             Ok(choice) => (format!("feedback lane: {}", choice.design), Some(choice.design.clone()), None),
             Err(reason) => (format!("no feedback lane: {reason}"), None, Some(reason.clone())),
         };
         session.console.note(&remarks);
+        if let Some(overridden) = &gates.overridden {
+            remarks = format!("{remarks}; {overridden}");
+        }
         let mut description = describe(lane.as_ref().ok().map(|choice| &choice.lane), &remarks);
         let exported =
             |description: &Description| encode(description, Some(&learned.quantised), Precision::Int8, &learned.rows.calibration);
@@ -160,9 +177,28 @@ impl Train {
             bytes: model.len(),
             feedback_lane: design,
             refusal,
+            gates: gates.axes,
+            overridden: gates.overridden,
             files,
         };
         session.format.print(&trained, || text(&trained))
+    }
+
+    /// The gates of `diagnose`: the recipe's features are relative to now, so the gain has to be one as well.
+    fn pass_gates(&self, session: &Session, logs: &[FlightLog], delay_s: f64, seed: u64) -> Result<Passed> {
+        let axes = check_gates(logs, delay_s, seed);
+        let failures: Vec<String> = axes.iter().flat_map(AxisGates::failures).collect();
+        for warning in axes.iter().flat_map(AxisGates::warnings) {
+            session.console.note(&format!("warning: {warning}"));
+        }
+        let overridden = (!failures.is_empty()).then(|| format!("gates overridden by --force: {}", failures.join("; ")));
+        if let Some(overridden) = &overridden {
+            if !self.force {
+                bail!("--log: {}; `host-sim diagnose` says more, --force trains all the same", failures.join("; "));
+            }
+            session.console.note(&format!("warning: {overridden}"));
+        }
+        Ok(Passed { axes, overridden })
     }
 
     fn origin(&self, recipe: &Recipe) -> Result<Origin> {

@@ -9,6 +9,7 @@ pub mod demo;
 mod evaluation;
 mod files;
 mod flights;
+mod gates;
 mod lane;
 mod learn;
 mod models;
@@ -20,6 +21,7 @@ pub use build::{BuildError, Built, Purpose, best_in_flight, build, derived, smoo
 pub use evaluation::{EvaluationError, evaluate, model_card, per_flight, traces};
 pub use files::write_model_files;
 pub use flights::{FlightsError, Loop, reduction};
+pub use gates::{AxisGates, check_gates};
 pub use lane::{LaneChoice, LaneRefusal, choose_lane, dithered_logs, lanes, strongest_lane};
 pub use learn::{Candidates, Judge, LearnError, Learned, Rows, learn};
 pub use models::{FromFlights, ModelSet, describe, feedforward};

@@ -1,6 +1,7 @@
 //! The program `host-sim` as its users run it.
 
 mod demo;
+mod diagnose;
 mod program;
 mod refusals;
 mod steps;

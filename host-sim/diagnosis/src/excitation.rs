@@ -1,0 +1,147 @@
+//! What a record excites: how many tones, which band, how fast the loop answers.
+//!
+//! *in* a record; *out* orders and bands; *never* a band above half the record's rate; *source* Ljung, "System Identification",
+//! 13.2 (persistence of excitation), 6.4 (Welch's spectra and the coherence).
+
+use nalgebra::{Complex, DMatrix};
+use serde::Serialize;
+
+use crate::record::{Record, Segment};
+
+/// What of the loop's band the record shows.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Coverage {
+    /// Share of the lines up to the loop's bandwidth at which the coherence of reference and measured value is above one half.
+    pub share: f64,
+    /// Highest frequency with that coherence, Hz.
+    pub highest_hz: f64,
+    /// Number of coefficients that the reference can tell apart, at most [`LAGS`]: two for each tone.
+    pub order: usize,
+}
+
+/// Lags of the test of persistent excitation.
+pub const LAGS: usize = 12;
+/// Eigenvalues below this share of the largest are rounding.
+const RANK: f64 = 1e-10;
+/// Coherence above which a line is identified by the reference rather than by noise.
+const COHERENT: f64 = 0.5;
+
+/// Number of independent directions of the reference's increments: 2 for one sine, 0 for a constant.
+pub fn order_of_excitation(record: &Record) -> usize {
+    let mut gram = DMatrix::<f64>::zeros(LAGS, LAGS);
+    for Segment { reference, .. } in &record.segments {
+        let steps: Vec<f64> = reference.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        for window in steps.windows(LAGS) {
+            for i in 0..LAGS {
+                for j in 0..LAGS {
+                    gram[(i, j)] += window[i] * window[j];
+                }
+            }
+        }
+    }
+    let eigenvalues = gram.symmetric_eigenvalues();
+    let largest = eigenvalues.max();
+    let size: f64 = record.segments.iter().flat_map(|segment| &segment.reference).map(|value| value * value).sum();
+    // Increments that are rounding of a constant excite nothing.
+    if largest <= 1e-18 * size || largest == 0.0 {
+        return 0;
+    }
+    eigenvalues.iter().filter(|value| **value > RANK * largest).count()
+}
+
+/// Spectra of increments, line by line: the lines' spacing in Hz; reference, measured, cross.
+struct Spectra {
+    spacing_hz: f64,
+    lines: Vec<(f64, f64, Complex<f64>)>,
+}
+
+impl Spectra {
+    /// Welch's method on increments (which are whiter than positions): Hann windows that overlap by half.
+    fn new(record: &Record, length: usize) -> Self {
+        let count = length / 2;
+        let mut lines = vec![(0.0, 0.0, Complex::default()); count];
+        let basis: Vec<Complex<f64>> =
+            (0..length).map(|k| Complex::from_polar(1.0, -std::f64::consts::TAU * k as f64 / length as f64)).collect();
+        let hann = |k: usize| (std::f64::consts::PI * k as f64 / length as f64).sin().powi(2);
+        for Segment { reference, measured } in &record.segments {
+            for first in (0..(reference.len()).saturating_sub(length)).step_by(length / 2) {
+                let part = |values: &[f64]| -> Vec<f64> {
+                    (0..length).map(|k| hann(k) * (values[first + k + 1] - values[first + k])).collect()
+                };
+                let (u, y) = (part(reference), part(measured));
+                for (line, sums) in lines.iter_mut().enumerate() {
+                    let at = |values: &[f64]| -> Complex<f64> {
+                        values.iter().enumerate().map(|(k, value)| basis[(k * (line + 1)) % length] * *value).sum()
+                    };
+                    let (u, y) = (at(&u), at(&y));
+                    *sums = (sums.0 + u.norm_sqr(), sums.1 + y.norm_sqr(), sums.2 + y * u.conj());
+                }
+            }
+        }
+        Self { spacing_hz: 1.0 / (length as f64 * record.period_s), lines }
+    }
+}
+
+/// Length of Welch's windows: eight of them, or more, overlapping.
+fn window(record: &Record) -> usize {
+    let longest = record.segments.iter().map(|segment| segment.reference.len()).max().unwrap_or(0);
+    (longest / 5).clamp(16, 512) & !1
+}
+
+/// Whether a line is the reference's work rather than the noise's.
+fn coherent(line: &(f64, f64, Complex<f64>)) -> bool {
+    line.2.norm_sqr() > COHERENT * line.0 * line.1 && line.0 > 0.0
+}
+
+/// Frequency, Hz, below which 95 % of what passes the loop lies: magnitude of the cross spectrum of increments, of coherent lines. Half the
+/// record's rate if there are none.
+pub fn band(record: &Record) -> f64 {
+    let spectra = Spectra::new(record, window(record));
+    let passing = |line: &(f64, f64, Complex<f64>)| if coherent(line) { line.2.norm() } else { 0.0 };
+    let total: f64 = spectra.lines.iter().map(passing).sum();
+    let mut sum = 0.0;
+    for (index, line) in spectra.lines.iter().enumerate() {
+        sum += passing(line);
+        if total > 0.0 && sum >= 0.95 * total {
+            return (index + 1) as f64 * spectra.spacing_hz;
+        }
+    }
+    0.5 / record.period_s
+}
+
+/// What the record shows of a loop with that bandwidth, Hz; nothing above `trusted_hz` counts.
+pub fn coverage(record: &Record, bandwidth_hz: f64, trusted_hz: f64) -> Coverage {
+    let spectra = Spectra::new(record, window(record));
+    let inside = ((bandwidth_hz.min(trusted_hz) / spectra.spacing_hz) as usize).clamp(1, spectra.lines.len());
+    let seen = spectra.lines[..inside].iter().filter(|line| coherent(line)).count();
+    let highest = spectra.lines.iter().rposition(coherent).map_or(0, |index| index + 1);
+    Coverage {
+        share: seen as f64 / inside as f64,
+        highest_hz: (highest as f64 * spectra.spacing_hz).min(trusted_hz),
+        order: order_of_excitation(record),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(value: impl Fn(f64) -> f64) -> Record {
+        let time: Vec<f64> = (0..800).map(|tick| f64::from(tick) * 0.05).collect();
+        let values: Vec<f64> = time.iter().map(|time| value(*time)).collect();
+        Record::new(&time, &values, &values).unwrap()
+    }
+
+    #[test]
+    fn a_constant_excites_nothing_and_every_tone_two_coefficients() {
+        assert_eq!(order_of_excitation(&record(|_| 0.7)), 0);
+        assert_eq!(order_of_excitation(&record(|t| (2.0 * t).sin())), 2);
+        assert_eq!(order_of_excitation(&record(|t| (2.0 * t).sin() + (5.0 * t).cos() + (9.0 * t).sin())), 6);
+    }
+
+    #[test]
+    fn the_band_holds_the_fastest_tone() {
+        let found = band(&record(|t| (2.0 * t).sin() + (std::f64::consts::TAU * 3.0 * t).sin()));
+        assert!((2.9..3.6).contains(&found), "{found}");
+    }
+}

@@ -1,0 +1,212 @@
+//! What of a loop decides whether its inverse can be learned, each with its uncertainty.
+//!
+//! *in* an identified model and draws from its distribution; *out* [`Properties`]; *never* a value outside of its interval;
+//! *source* Zhou 2017, Insight 1 (relative degree, zero dynamics), Lemma 1 (gain).
+
+use serde::Serialize;
+
+use crate::{identification::Identified, transfer_function::TransferFunction};
+
+/// A value with the interval that holds it with 95 % of the draws' weight.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Interval {
+    /// Lower end.
+    pub low: f64,
+    /// Value.
+    pub value: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+impl Interval {
+    /// The middle 95 % of samples, widened so that it holds the value.
+    pub fn of(value: f64, samples: impl IntoIterator<Item = f64>) -> Self {
+        let mut sorted: Vec<f64> = samples.into_iter().filter(|sample| sample.is_finite()).collect();
+        sorted.sort_by(f64::total_cmp);
+        let at = |share: f64| {
+            let index = (share * sorted.len().saturating_sub(1) as f64).round() as usize;
+            sorted.get(index).copied().unwrap_or(value)
+        };
+        Self { low: at(0.025).min(value), value, high: at(0.975).max(value) }
+    }
+
+    /// Whether a value lies inside.
+    pub fn contains(&self, value: f64) -> bool {
+        (self.low..=self.high).contains(&value)
+    }
+}
+
+/// Ticks from a step of the reference to the first answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct RelativeDegree {
+    /// Lower end of the interval.
+    pub low: usize,
+    /// The value.
+    pub value: usize,
+    /// Upper end of the interval.
+    pub high: usize,
+}
+
+/// Where a zero lies with respect to the unit circle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Place {
+    /// Inside, in 95 % of the draws.
+    Inside,
+    /// Outside, in 95 % of the draws.
+    Outside,
+    /// The record does not say.
+    Undecided,
+}
+
+/// A zero of the channel.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Zero {
+    /// Real part.
+    pub re: f64,
+    /// Imaginary part; one zero stands for the pair.
+    pub im: f64,
+    /// Distance from the origin.
+    pub magnitude: Interval,
+    /// Natural frequency |ln z| / 2π, Hz: how fast what it holds grows or dies, or turns.
+    pub frequency_hz: f64,
+    /// With respect to the unit circle.
+    pub place: Place,
+}
+
+/// Properties of a channel at its sub-rate.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Properties {
+    /// Strict: the first coefficient of the response that the data can tell from zero (weights of BIC).
+    pub strict_degree: RelativeDegree,
+    /// Practical: the first tick at which the step response is above [`THRESHOLD`] of its end.
+    pub practical_degree: RelativeDegree,
+    /// Steady-state gain.
+    pub gain: Interval,
+    /// Output at zero input, in the output's unit.
+    pub offset: Interval,
+    /// How far the step response first goes the wrong way, as a share of its end (above 1: further than the end itself); 0: it does not.
+    pub reversal: Interval,
+    /// Ticks until the step response has its final sign for good.
+    pub reversal_ticks: usize,
+    /// Zeros, the largest first.
+    pub zeros: Vec<Zero>,
+    /// Lag of slow signals, s.
+    pub lag_s: Interval,
+    /// Frequency of -3 dB, Hz; half the sub-rate if the loop is faster.
+    pub bandwidth_hz: Interval,
+    /// Time until a step has settled to 2 %, s.
+    pub settling_s: f64,
+    /// Standard deviation of what the model does not explain, in the output's unit.
+    pub noise: f64,
+    /// Share of the measured variance that the model explains.
+    pub explained: f64,
+}
+
+/// Share of the final value that the practical relative degree waits for.
+pub const THRESHOLD: f64 = 0.1;
+/// A reversal smaller than this share of the end is no reversal.
+const LEAST_REVERSAL: f64 = 0.02;
+/// Longest step response that is looked at, ticks.
+const HORIZON: usize = 400;
+
+impl Properties {
+    /// Properties of a model; `draws` are other models that could be the true one.
+    pub fn of(identified: &Identified, draws: &[TransferFunction], measured: &[&[f64]], period_s: f64) -> Self {
+        let model = &identified.model;
+        let over = |property: &dyn Fn(&TransferFunction) -> f64| Interval::of(property(model), draws.iter().map(property));
+        let degree = |property: &dyn Fn(&TransferFunction) -> usize| {
+            let found = over(&|model| property(model) as f64);
+            RelativeDegree { low: found.low as usize, value: found.value as usize, high: found.high as usize }
+        };
+        let horizon = (model.settling() + 20).min(HORIZON);
+        let (noise, explained) = fit(identified, measured);
+        let reversals = |model: &TransferFunction| reversal(model, horizon).0;
+        Self {
+            strict_degree: strict(identified),
+            practical_degree: degree(&|model| model.first_above(THRESHOLD, horizon)),
+            gain: over(&TransferFunction::gain),
+            offset: over(&|model| model.offset),
+            reversal: over(&reversals),
+            reversal_ticks: reversal(model, horizon).1,
+            zeros: zeros(model, draws, period_s),
+            lag_s: over(&|model| model.lag() * period_s),
+            bandwidth_hz: over(&|model| model.bandwidth() / (std::f64::consts::TAU * period_s)),
+            settling_s: model.settling() as f64 * period_s,
+            noise,
+            explained,
+        }
+    }
+}
+
+/// Dead times with 95 % of the weight, round the best.
+fn strict(identified: &Identified) -> RelativeDegree {
+    let value = identified.model.dead_time;
+    let mut inside = RelativeDegree { low: value, value, high: value };
+    let mut sorted = identified.dead_times.clone();
+    sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut weight = 0.0;
+    for (dead_time, share) in sorted {
+        if weight >= 0.95 {
+            break;
+        }
+        weight += share;
+        (inside.low, inside.high) = (inside.low.min(dead_time), inside.high.max(dead_time));
+    }
+    inside
+}
+
+/// Largest excursion against the final sign, as a share of the end, and the ticks until the final sign stays.
+fn reversal(model: &TransferFunction, horizon: usize) -> (f64, usize) {
+    let gain = model.gain();
+    let response = model.step_response(horizon);
+    let wrong = response.iter().map(|value| -value / gain).fold(0.0, f64::max);
+    if wrong < LEAST_REVERSAL {
+        return (0.0, 0);
+    }
+    (wrong, response.iter().rposition(|value| -value / gain > 0.0).map_or(0, |tick| tick + 1))
+}
+
+fn zeros(model: &TransferFunction, draws: &[TransferFunction], period_s: f64) -> Vec<Zero> {
+    let upper = |model: &TransferFunction| {
+        let mut zeros: Vec<_> = model.zeros().into_iter().filter(|zero| zero.im >= -1e-9).collect();
+        zeros.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
+        zeros
+    };
+    let of_draws: Vec<_> = draws.iter().map(upper).collect();
+    upper(model)
+        .into_iter()
+        .map(|zero| {
+            // In each draw the zero nearest to this one, seen from the origin by the ratio: 0.5 and 2 are as far from 1.
+            let nearest = of_draws.iter().filter_map(|zeros| {
+                let distance = |other: &nalgebra::Complex<f64>| (other - zero).norm() / (other.norm() + zero.norm());
+                zeros.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).map(|other| other.norm())
+            });
+            let magnitudes: Vec<f64> = nearest.collect();
+            let outside = magnitudes.iter().filter(|magnitude| **magnitude > 1.0).count() as f64 / magnitudes.len().max(1) as f64;
+            let place = match zero.norm() > 1.0 {
+                true if outside >= 0.95 => Place::Outside,
+                false if outside <= 0.05 => Place::Inside,
+                _ => Place::Undecided,
+            };
+            Zero {
+                re: zero.re,
+                im: zero.im,
+                magnitude: Interval::of(zero.norm(), magnitudes),
+                frequency_hz: zero.ln().norm() / (std::f64::consts::TAU * period_s),
+                place,
+            }
+        })
+        .collect()
+}
+
+fn fit(identified: &Identified, measured: &[&[f64]]) -> (f64, f64) {
+    let variance = |values: &mut dyn Iterator<Item = f64>| {
+        let values: Vec<f64> = values.collect();
+        let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+        values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len().max(1) as f64
+    };
+    let noise = variance(&mut identified.noise.iter().flatten().copied());
+    let total = variance(&mut measured.iter().flat_map(|segment| segment.iter()).copied());
+    (noise.sqrt(), if total > 0.0 { (1.0 - noise / total).max(0.0) } else { 0.0 })
+}

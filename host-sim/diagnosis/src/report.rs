@@ -1,0 +1,203 @@
+//! The diagnosis in words, for a reader who doubts it: every figure with its interval and with what it was judged by.
+
+use crate::{
+    Diagnosis,
+    add_on::Features,
+    properties::{Interval, RelativeDegree, THRESHOLD},
+    verdict::{FAR, Gate, LEAST_REDUCTION, Verdict, judged_zeros},
+};
+
+/// Width of the text, characters.
+const WIDTH: usize = 130;
+
+impl Diagnosis {
+    /// The verdict and why, in one sentence or two.
+    pub fn verdict_text(&self) -> String {
+        let prediction = &self.prediction;
+        let reduction = percent(prediction.reduction_percent);
+        let mut text = self.verdict.words().to_owned();
+        match self.verdict {
+            Verdict::WillHelp => {
+                text += &format!(": stable inverse, gain of one; predicted reduction of the RMS error {reduction}")
+            }
+            Verdict::WillHelpWithoutDifferenceLearning => {
+                let why = self.gates.unit_gain.why().unwrap_or_default();
+                text += &format!(": {why}; predicted reduction of the RMS error {reduction}");
+            }
+            Verdict::WillNot => {
+                for gate in [&self.gates.stable_inverse, &self.gates.excitation] {
+                    if let Gate::Failed(why) = gate {
+                        text += &format!(": {why}");
+                    }
+                }
+                if let Gate::Failed(_) = self.gates.stable_inverse {
+                    text += &format!(
+                        ". Not the inverse, but a window over the desired output alone stays bounded; its predicted reduction is {reduction}"
+                    );
+                } else if prediction.reduction_percent.value < LEAST_REDUCTION {
+                    text += &format!(
+                        ": there is little to gain; predicted reduction {reduction}, noise alone leaves {:.3e} of {:.3e} RMS",
+                        prediction.floor, prediction.baseline.value
+                    );
+                }
+            }
+        }
+        text
+    }
+
+    /// The lines as text for a terminal, broken at [`WIDTH`] characters.
+    pub fn text(&self, unit: &str) -> String {
+        let lines = self.lines(unit);
+        let label = lines.iter().map(|[label, _]| label.chars().count()).max().unwrap_or(0) + 2;
+        let mut text = String::new();
+        for [name, words] in lines {
+            let mut column = label;
+            text += &format!("{name:label$}");
+            for word in words.split(' ') {
+                if column + word.chars().count() > WIDTH && column > label {
+                    text += &format!("\n{:label$}", "");
+                    column = label;
+                }
+                text += word;
+                text.push(' ');
+                column += word.chars().count() + 1;
+            }
+            text.truncate(text.trim_end().len());
+            text.push('\n');
+        }
+        text
+    }
+
+    /// Lines of label and text; `unit` is that of the measured value.
+    pub fn lines(&self, unit: &str) -> Vec<[String; 2]> {
+        let (properties, prediction) = (&self.properties, &self.prediction);
+        let tick = 1e3 / self.sub_rate_hz;
+        let line = |label: &str, text: String| [label.to_owned(), text];
+        let mut lines = vec![line("verdict", self.verdict_text())];
+        for gate in [&self.gates.unit_gain, &self.gates.stable_inverse, &self.gates.excitation] {
+            if let Gate::Undecided(why) = gate {
+                lines.push(line("undecided", why.clone()));
+            }
+        }
+        let reduction = prediction.reduction_percent;
+        if reduction.value >= LEAST_REDUCTION && reduction.low < LEAST_REDUCTION {
+            let why = "the predicted reduction reaches down to harm: the log leaves too many models; a longer or quieter one, or a slower \
+                       --sub-rate, decides";
+            lines.push(line("undecided", why.into()));
+        }
+        let features = match prediction.features {
+            Features::Relative => "relative to now (difference learning)",
+            Features::Absolute => "absolute",
+        };
+        lines.push(line(
+            "recommended",
+            format!(
+                "sub-rate {:.3} Hz, preview {:.3} s, desired output from {:.3} s ago to there, {features}",
+                self.recommended_sub_rate_hz,
+                self.recommended_preview_s,
+                prediction.window.past as f64 / self.sub_rate_hz
+            ),
+        ));
+        lines.push(line(
+            "predicted error",
+            format!(
+                "{:.3e} {unit} RMS without, {:.3e} ({:.3e} … {:.3e}) with the add-on; noise alone {:.3e}; on signals of the log's kind",
+                prediction.baseline.value,
+                prediction.with_add_on.value,
+                prediction.with_add_on.low,
+                prediction.with_add_on.high,
+                prediction.floor
+            ),
+        ));
+        if let Some(other) = &self.with_difference_learning {
+            lines.push(line("with difference learning", format!("predicted reduction {}", percent(other.reduction_percent))));
+        }
+        lines.push(line(
+            "relative degree",
+            format!(
+                "{} strict (first coefficient that the data tell from zero); {} practical (first tick above {:.0} % of the step); ticks of {tick:.1} ms",
+                degree(properties.strict_degree),
+                degree(properties.practical_degree),
+                100.0 * THRESHOLD
+            ),
+        ));
+        lines.push(line("steady-state gain", interval(properties.gain, 3)));
+        lines.push(line("output at zero", format!("{} {unit}", interval(properties.offset, 4))));
+        lines.push(line("initial reversal", self.reversal_text()));
+        let inside = |re: f64, im: f64| judged_zeros(properties, &self.coverage).any(|zero| (zero.re, zero.im) == (re, im));
+        let zeros = properties.zeros.iter().map(|zero| {
+            let seen = if inside(zero.re, zero.im) {
+                ""
+            } else {
+                match zero.magnitude.value {
+                    FAR.. => ", so far out that it is one more tick of dead time",
+                    _ => ", faster than what the log excites: not judged",
+                }
+            };
+            format!("{}{seen}", zero.words())
+        });
+        let zeros: Vec<String> = zeros.collect();
+        lines.push(line("zeros", if zeros.is_empty() { "none".into() } else { zeros.join("; ") }));
+        let poles = self.model.poles().iter().map(|pole| format!("{:.3}", pole.norm())).collect::<Vec<_>>().join(", ");
+        lines.push(line("poles", format!("|z| {poles}")));
+        lines.push(line(
+            "lag of slow signals",
+            format!("{} s; settles in {:.2} s", interval(properties.lag_s, 3), properties.settling_s),
+        ));
+        lines.push(line("bandwidth (-3 dB)", format!("{} Hz", interval(properties.bandwidth_hz, 2))));
+        lines.push(line(
+            "noise floor",
+            format!(
+                "{:.3e} {unit} RMS; the model explains {:.2} % of the measured variance",
+                properties.noise,
+                100.0 * properties.explained
+            ),
+        ));
+        lines.push(line(
+            "excitation",
+            format!(
+                "{:.0} % of the band up to the bandwidth is above the noise, the highest at {:.2} Hz",
+                100.0 * self.coverage.share,
+                self.coverage.highest_hz
+            ),
+        ));
+        lines.push(line(
+            "identified from",
+            format!(
+                "{} samples at {:.2} Hz (log: {:.2} Hz); intervals hold 95 % of the linear models that could be true; seed {}",
+                self.samples, self.sub_rate_hz, self.rate_hz, self.seed
+            ),
+        ));
+        lines
+    }
+
+    fn reversal_text(&self) -> String {
+        let reversal = self.properties.reversal;
+        if reversal.value == 0.0 {
+            return "none".into();
+        }
+        format!(
+            "{:.1} % of the step ({:.1} … {:.1} %), final sign after {} ticks",
+            100.0 * reversal.value,
+            100.0 * reversal.low,
+            100.0 * reversal.high,
+            self.properties.reversal_ticks
+        )
+    }
+}
+
+fn degree(degree: RelativeDegree) -> String {
+    if degree.low == degree.high {
+        degree.value.to_string()
+    } else {
+        format!("{} ({} … {})", degree.value, degree.low, degree.high)
+    }
+}
+
+fn interval(interval: Interval, decimals: usize) -> String {
+    format!("{:.decimals$} ({:.decimals$} … {:.decimals$})", interval.value, interval.low, interval.high)
+}
+
+fn percent(interval: Interval) -> String {
+    format!("{:.1} % ({:.1} … {:.1} %)", interval.value, interval.low, interval.high)
+}

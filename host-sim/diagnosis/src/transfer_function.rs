@@ -1,0 +1,110 @@
+//! Transfer functions of a channel in discrete time.
+
+use nalgebra::Complex;
+use serde::Serialize;
+
+use crate::polynomial::{at_angle, at_one, delayed, filter, roots};
+
+/// y(t) = q⁻ᵈ B(q⁻¹)/F(q⁻¹) u(t) + offset.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TransferFunction {
+    /// Dead time d in ticks: the strict relative degree if `numerator[0]` is not zero.
+    pub dead_time: usize,
+    /// B, in rising powers of q⁻¹.
+    pub numerator: Vec<f64>,
+    /// F, in rising powers of q⁻¹, first 1, stable.
+    pub denominator: Vec<f64>,
+    /// Output at zero input.
+    pub offset: f64,
+}
+
+impl TransferFunction {
+    /// Output for an input that had its first value for ever before.
+    pub fn simulate(&self, input: &[f64]) -> Vec<f64> {
+        let mut output = filter(&self.numerator, &self.denominator, &delayed(input, self.dead_time));
+        output.iter_mut().for_each(|value| *value += self.offset);
+        output
+    }
+
+    /// Steady-state gain.
+    pub fn gain(&self) -> f64 {
+        at_one(&self.numerator) / at_one(&self.denominator)
+    }
+
+    /// Finite zeros.
+    pub fn zeros(&self) -> Vec<Complex<f64>> {
+        roots(&self.numerator)
+    }
+
+    /// Poles.
+    pub fn poles(&self) -> Vec<Complex<f64>> {
+        roots(&self.denominator)
+    }
+
+    /// Response to a unit step at tick 0, without the offset.
+    pub fn step_response(&self, ticks: usize) -> Vec<f64> {
+        // The filter thinks that a signal had its first value for ever: the step comes a tick later.
+        let input: Vec<f64> = std::iter::once(0.0).chain(std::iter::repeat_n(1.0, ticks)).collect();
+        let response = filter(&self.numerator, &self.denominator, &delayed(&input, self.dead_time));
+        response.into_iter().skip(1).collect()
+    }
+
+    /// Answer to a sine; `angle` in rad a tick.
+    pub fn response(&self, angle: f64) -> Complex<f64> {
+        at_angle(&self.numerator, angle) / at_angle(&self.denominator, angle)
+            * Complex::from_polar(1.0, -angle * self.dead_time as f64)
+    }
+
+    /// Ticks until the step response stays within 2 % of its range round the end, at most 2,000.
+    pub fn settling(&self) -> usize {
+        let slowest = self.poles().iter().map(|pole| pole.norm()).fold(0.0, f64::max);
+        let horizon = (self.dead_time as f64 + 10.0 + 6.0 / -slowest.clamp(1e-3, 0.9999).ln()).min(2000.0) as usize;
+        let response = self.step_response(horizon);
+        let gain = self.gain();
+        let range = response.iter().map(|value| value.abs()).fold(gain.abs(), f64::max);
+        response.iter().rposition(|value| (value - gain).abs() > 0.02 * range).map_or(1, |tick| tick + 1)
+    }
+
+    /// First tick from 1 on at which the step response is `share` of the gain in size; the horizon if there is none.
+    pub fn first_above(&self, share: f64, horizon: usize) -> usize {
+        let bound = share * self.gain().abs();
+        let response = self.step_response(horizon + 1);
+        response.iter().skip(1).position(|value| value.abs() >= bound).map_or(horizon, |tick| tick + 1)
+    }
+
+    /// Lowest frequency, in rad a tick, at which the answer has fallen by 3 dB against standing still; π if it never does.
+    pub fn bandwidth(&self) -> f64 {
+        let bound = self.gain().abs() * std::f64::consts::FRAC_1_SQRT_2;
+        let angles = (1..=600).map(|step| std::f64::consts::PI * f64::from(step) / 600.0);
+        angles.into_iter().find(|angle| self.response(*angle).norm() < bound).unwrap_or(std::f64::consts::PI)
+    }
+
+    /// Lag at low frequency in ticks: how much later a slow signal arrives. (Group delay at ω = 0.)
+    pub fn lag(&self) -> f64 {
+        let moment = |polynomial: &[f64]| {
+            let weighted: f64 = polynomial.iter().enumerate().map(|(power, c)| power as f64 * c).sum();
+            weighted / at_one(polynomial)
+        };
+        self.dead_time as f64 + moment(&self.numerator) - moment(&self.denominator)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_papers_first_system_has_its_zero_gain_and_degree() {
+        let system =
+            TransferFunction { dead_time: 1, numerator: vec![1.0, -0.2], denominator: vec![1.0, -0.8, 0.15], offset: 0.0 };
+        assert!((system.gain() - 16.0 / 7.0).abs() < 1e-12);
+        assert!((system.zeros()[0].re - 0.2).abs() < 1e-12);
+        let response = system.step_response(60);
+        assert_eq!((response[0], response[1]), (0.0, 1.0));
+        assert!((response[59] - 16.0 / 7.0).abs() < 1e-9);
+        assert_eq!(system.first_above(0.1, 20), 1);
+        // A slow ramp arrives `lag` ticks late.
+        let ramp: Vec<f64> = (0..200).map(f64::from).collect();
+        assert!((199.0 - system.simulate(&ramp)[199] / system.gain() - system.lag()).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,106 @@
+//! The promise of the diagnosis: verdict, relative degree and prediction on loops that are known.
+
+use impromptu_diagnosis::{
+    Diagnosis, Settings, Verdict,
+    add_on::AddOn,
+    diagnose,
+    prediction::root_mean_square,
+    properties::{Interval, THRESHOLD},
+};
+use rayon::prelude::*;
+
+use crate::loops::{Known, PERIOD};
+
+/// Of the twenty loops that are asserted. What was chosen in the diagnosis was chosen on loops of `tuning`.
+const TEST_SEED: u64 = 0x7e57_0000;
+
+struct Outcome {
+    known: Known,
+    found: Diagnosis,
+    measured: f64,
+}
+
+impl Outcome {
+    fn of(index: usize, seed: u64) -> Self {
+        let seed = seed + 97 * index as u64;
+        let known = Known::new(index, seed);
+        let record = known.record(2500, seed + 1);
+        let settings = Settings { sub_rate_hz: Some(1.0 / PERIOD), seed, ..Settings::default() };
+        let found = diagnose(&record, &settings).unwrap();
+        // The add-on is trained on that log and flown on the loop itself, along signals that are in no log.
+        let add_on = AddOn::fit(&record.segments, found.prediction.window, found.prediction.features).unwrap();
+        let error = |with: bool| {
+            root_mean_square((0..5).flat_map(|flight| {
+                let desired = known.signal(600, seed + 1000 + flight);
+                let references = if with { add_on.references(&desired) } else { desired.clone() };
+                let measured = known.measured(&references, seed + 2000 + flight + if with { 50 } else { 0 });
+                desired.into_iter().zip(measured).skip(40).map(|(desired, y)| desired - y).collect::<Vec<_>>()
+            }))
+        };
+        let measured = 100.0 * (1.0 - error(true) / error(false));
+        Self { known, found, measured }
+    }
+
+    fn wanted(&self) -> Verdict {
+        match (self.known.minimum_phase, self.known.unit_gain) {
+            (false, _) => Verdict::WillNot,
+            (true, true) => Verdict::WillHelp,
+            (true, false) => Verdict::WillHelpWithoutDifferenceLearning,
+        }
+    }
+
+    fn degrees_right(&self) -> bool {
+        let properties = &self.found.properties;
+        let practical = self.known.model.first_above(THRESHOLD, 400);
+        properties.strict_degree.value.abs_diff(self.known.model.dead_time) <= 1
+            && properties.practical_degree.value.abs_diff(practical) <= 1
+    }
+
+    fn line(&self) -> String {
+        let (properties, Interval { low, value, high }) = (&self.found.properties, self.found.prediction.reduction_percent);
+        let zeros: Vec<String> = properties.zeros.iter().map(|zero| zero.words()).collect();
+        format!(
+            "{} {} r {}/{} practical {}/{} gain {:.3}/{:.3} predicted {low:.1} {value:.1} {high:.1} measured {:.1} {} {:?} orders {}/{} true zeros {:?} found {zeros:?}",
+            if self.found.verdict == self.wanted() { "right" } else { "WRONG" },
+            if self.degrees_right() { "right" } else { "WRONG" },
+            properties.strict_degree.value,
+            self.known.model.dead_time,
+            properties.practical_degree.value,
+            self.known.model.first_above(THRESHOLD, 400),
+            properties.gain.value,
+            self.known.model.gain(),
+            self.measured,
+            if self.found.prediction.reduction_percent.contains(self.measured) { "covered" } else { "MISSED" },
+            self.found.prediction.window,
+            self.found.model.denominator.len() - 1,
+            self.known.model.denominator.len() - 1,
+            self.known.model.zeros().iter().map(|zero| zero.norm()).collect::<Vec<_>>(),
+        )
+    }
+}
+
+fn outcomes(seed: u64, count: usize) -> Vec<Outcome> {
+    (0..count).into_par_iter().map(|index| Outcome::of(index, seed)).collect()
+}
+
+#[test]
+fn twenty_loops_are_judged_rightly_and_eighteen_predictions_hold() {
+    let outcomes = outcomes(TEST_SEED, 20);
+    let text: Vec<String> = outcomes.iter().map(Outcome::line).collect();
+    let text = text.join("\n");
+    assert!(outcomes.iter().all(|outcome| outcome.found.verdict == outcome.wanted()), "{text}");
+    assert!(outcomes.iter().all(Outcome::degrees_right), "{text}");
+    let covered = outcomes.iter().filter(|outcome| outcome.found.prediction.reduction_percent.contains(outcome.measured));
+    assert!(covered.count() >= 18, "{text}");
+}
+
+/// For whoever changes the diagnosis: loops of other seeds, to be read. `cargo test -p impromptu-diagnosis -- --ignored --nocapture tuning`
+#[test]
+#[ignore = "a table to read, not a promise"]
+fn tuning() {
+    for base in 21..=25u64 {
+        for outcome in outcomes(base << 20, 20) {
+            println!("{}", outcome.line());
+        }
+    }
+}

@@ -1,0 +1,5 @@
+//! What the diagnosis promises.
+
+mod generated;
+mod known_systems;
+mod loops;

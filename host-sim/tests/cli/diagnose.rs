@@ -1,0 +1,126 @@
+//! The diagnosis of logs and of simulated loops, and the gates before a training.
+
+use impromptu_firmware::model::Model;
+
+use crate::program::Folder;
+
+/// A loop in numbers: y(t+2) = 0.8 y(t+1) + gain 0.2 u(t), under steps that a linear congruence draws.
+fn log(gain: f64, rows: usize) -> String {
+    let mut state = 7u64;
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as f64 / f64::from(1u32 << 31) - 0.5
+    };
+    let (mut text, mut reference, mut before, mut measured, mut held) =
+        (String::from("time_s,reference,measured\n"), 0.0, 0.0, 0.0, 0);
+    for row in 0..rows {
+        text += &format!("{},{reference},{}\n", row as f64 * 0.02, measured + 0.01 * uniform());
+        measured = 0.8 * measured + 0.2 * gain * before;
+        before = reference;
+        if held == 0 {
+            (reference, held) = (2.0 * uniform(), 5 + (20.0 * (uniform() + 0.5)) as usize);
+        }
+        held -= 1;
+    }
+    text
+}
+
+#[test]
+fn the_log_of_any_loop_is_diagnosed() {
+    let folder = Folder::new();
+    folder.write("one.csv", log(1.0, 2500));
+    folder.write("half.csv", log(0.5, 2500).replace("time_s,reference,measured", "t,setpoint,angle"));
+    let found = folder.fine("diagnose --log one.csv --sub-rate 50 --format json").json();
+    let diagnosis = &found["channels"][0]["diagnosis"];
+    assert_eq!(
+        (diagnosis["verdict"].as_str(), diagnosis["properties"]["strict_degree"]["value"].as_u64()),
+        (Some("will_help"), Some(2))
+    );
+    let text = folder.fine("diagnose --log half.csv --columns t,setpoint,angle").stdout;
+    for part in [
+        "will help without difference learning",
+        "steady-state gain",
+        "predicted reduction",
+        "relative degree",
+        "sub-rate",
+        "seed 1",
+    ] {
+        assert!(text.contains(part), "`{part}` is missing in {text}");
+    }
+    assert_eq!(text, folder.fine("diagnose --log half.csv --columns t,setpoint,angle").stdout);
+}
+
+#[test]
+fn what_is_wrong_with_a_log_and_what_to_do_is_said() {
+    let folder = Folder::new();
+    let good = log(1.0, 400);
+    let edited = |line: usize, text: &str| {
+        let mut lines: Vec<&str> = good.lines().collect();
+        lines[line] = text;
+        lines.join("\n")
+    };
+    folder.write("short.csv", log(1.0, 30));
+    folder.write("nan.csv", edited(40, "0.78,NaN,0"));
+    folder.write(
+        "gap.csv",
+        good.lines()
+            .enumerate()
+            .filter(|(row, _)| !(100..130).contains(row))
+            .map(|(_, line)| format!("{line}\n"))
+            .collect::<String>(),
+    );
+    folder.write("column.csv", good.replacen("measured", "angle", 1));
+    folder.write(
+        "still.csv",
+        (0..300)
+            .map(|row| format!("{},1,1\n", f64::from(row) * 0.02))
+            .fold("time_s,reference,measured\n".into(), |text: String, row| text + &row),
+    );
+    folder.refused("diagnose --log short.csv", &["short.csv", "30 rows are too few"]);
+    folder.refused("diagnose --log nan.csv", &["nan.csv", "line 41", "`reference`", "NaN"]);
+    folder.refused("diagnose --log gap.csv", &["gap.csv", "row 99", "resample"]);
+    folder.refused("diagnose --log column.csv", &["column.csv", "`measured`", "time_s, reference, angle", "--columns"]);
+    folder.refused("diagnose --log still.csv", &["no excitation", "steps"]);
+    folder.refused("diagnose --log absent.csv", &["absent.csv"]);
+}
+
+#[test]
+fn a_simulated_loop_is_diagnosed_on_every_axis() {
+    let folder = Folder::new();
+    let found = folder.fine("diagnose --vehicle crazyflie --condition lab --format json").json();
+    for axis in 0..3 {
+        let channel = &found["channels"][axis];
+        assert_eq!(channel["diagnosis"]["verdict"], "will_help", "{channel}");
+        assert!(channel["diagnosis"]["prediction"]["reduction_percent"]["low"].as_f64().unwrap() > 70.0, "{channel}");
+    }
+    let steps = folder.fine("diagnose --vehicle crazyflie --condition lab --test steps --axis x").stdout;
+    assert!(steps.contains("steps of the position reference") && steps.contains("\nx\n") && !steps.contains("\ny\n"), "{steps}");
+}
+
+#[test]
+fn training_refuses_a_gain_that_is_not_one_and_records_that_it_was_forced() {
+    let folder = Folder::new();
+    folder.fine("collect --condition lab --signal strokes spline --flights 3 --seconds 12 --out logs");
+    // As if the loop came only half of the way: every measured position halved.
+    for name in folder.files("logs", ".csv") {
+        let text = String::from_utf8(folder.read(&name)).unwrap();
+        let header: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+        let halved = text.lines().skip(1).map(|line| {
+            let cells = line.split(',').zip(&header).map(|(cell, column)| {
+                let half = column.starts_with("measured_") && column.ends_with("_m");
+                if half { (0.5 * cell.parse::<f64>().unwrap()).to_string() } else { cell.to_owned() }
+            });
+            cells.collect::<Vec<_>>().join(",")
+        });
+        let lines: Vec<String> = std::iter::once(header.join(",")).chain(halved).collect();
+        folder.write(&name, lines.join("\n"));
+    }
+    let logs = folder.files("logs", ".csv").join(" ");
+    folder.refused(&format!("train --log {logs} --recipe recipe.toml"), &["axis x", "steady-state gain 0.5", "--force"]);
+    let run = folder.fine(&format!("train --log {logs} --recipe recipe.toml --force --out models --format json"));
+    assert!(run.stderr.contains("warning: gates overridden by --force"), "{}", run.stderr);
+    assert!(run.json()["overridden"].as_str().unwrap().contains("steady-state gain"));
+    let bytes = folder.read("models/model.impromptu");
+    let remarks = Model::from_bytes(&bytes).unwrap().card().provenance.remarks.to_owned();
+    assert!(remarks.contains("gates overridden by --force") && remarks.contains("axis z"), "{remarks}");
+}
