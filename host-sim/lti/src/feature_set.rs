@@ -73,6 +73,13 @@ impl FeatureSet {
         self.features.iter().map(|feature| value(feature, moment) - origin(feature.relative, moment)).collect()
     }
 
+    /// The features' values as the microcontroller computes them: of signals rounded to f32.
+    pub fn narrow_inputs<T: Scalar>(&self, moment: &Moment<'_, T>) -> Vec<f32> {
+        let narrow = |value: T| value.wide() as f32;
+        let features = self.features.iter();
+        features.map(|feature| narrow(value(feature, moment)) - narrow(origin(feature.relative, moment))).collect()
+    }
+
     /// What is added to the network's output.
     pub fn base<T: Scalar>(&self, moment: &Moment<'_, T>) -> T {
         origin(self.output, moment)

@@ -28,8 +28,11 @@ pub fn position_and_difference(dc_gain: f64) -> StateSpace {
     system(&[1.0, 1.0, -0.35, -0.2], &[0.0, 0.35 * dc_gain], &[1.0, 0.0])
 }
 
-/// The test trajectory sin(2πt/15) + cos(2πt/12) - 1 at `seconds`.
+/// The test trajectory sin(2πt/15) + cos(2πt/12) - 1 at `seconds`; zero before the start, as the loop is at rest then.
 pub fn test_trajectory(seconds: f64) -> f64 {
+    if seconds <= 0.0 {
+        return 0.0;
+    }
     libm::sin(std::f64::consts::TAU * seconds / 15.0) + libm::cos(std::f64::consts::TAU * seconds / 12.0) - 1.0
 }
 

@@ -61,9 +61,8 @@ mod tests {
     use crate::{Start, fixtures, simulate};
     use proptest::prelude::*;
 
-    /// y_d that has been at its start value of zero before sample 0, so that both laws start from the same past.
     fn desired<T: Scalar>(sample: i64) -> T {
-        T::of(if sample <= 0 { 0.0 } else { fixtures::test_trajectory(sample as f64 * fixtures::PERIOD) })
+        T::of(fixtures::test_trajectory(sample as f64 * fixtures::PERIOD))
     }
 
     #[test]

@@ -13,17 +13,27 @@
 //!
 //! The desired output, the reference and the states are pure numbers, time is counted in samples.
 
+pub mod deployment;
 pub mod feature_set;
 pub mod fixtures;
 pub mod law;
+pub mod learning;
+pub mod levenberg_marquardt;
+pub mod network;
+pub mod normal_equations;
 pub mod polynomial;
+pub mod samples;
 pub mod scalar;
 pub mod signal;
 pub mod simulation;
 pub mod state_space;
 pub mod transfer_function;
 
+pub use deployment::FirmwareModule;
 pub use feature_set::FeatureSet;
+pub use learning::{Assessment, Learned, assess, learn};
+pub use network::{Network, NetworkModule};
+pub use samples::Rows;
 pub use scalar::Scalar;
 pub use simulation::{Module, Moment, Plant, Run, Start, simulate};
 pub use state_space::StateSpace;

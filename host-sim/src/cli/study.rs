@@ -17,11 +17,37 @@ pub(super) struct Study {
 }
 
 #[derive(Debug, Subcommand)]
-enum Subject {}
+enum Subject {
+    /// Linear systems: exact laws, learned inverse, feature sets, difference learning (Insight 1, Lemma 1).
+    Lti(Lti),
+}
+
+/// Arguments of `study lti`.
+#[derive(Debug, Args)]
+struct Lti {
+    /// Networks trained for each system and feature set; the best in the f32 kernel is kept.
+    #[arg(long, default_value_t = study::lti::Settings::default().learning.restarts)]
+    restarts: usize,
+    /// Most steps of Levenberg-Marquardt.
+    #[arg(long, default_value_t = study::lti::Settings::default().learning.training.iterations)]
+    iterations: usize,
+}
 
 impl Study {
-    pub(super) fn run(self, _: &Session) -> Result<()> {
-        match self.subject {}
+    pub(super) fn run(self, session: &Session) -> Result<()> {
+        match self.subject {
+            Subject::Lti(lti) => lti.run(session),
+        }
+    }
+}
+
+impl Lti {
+    fn run(self, session: &Session) -> Result<()> {
+        let mut settings = study::lti::Settings::default();
+        settings.learning.seed = session.configuration.seed;
+        settings.learning.restarts = self.restarts;
+        settings.learning.training.iterations = self.iterations;
+        show(session, "lti", &study::lti::run(&settings)?)
     }
 }
 
