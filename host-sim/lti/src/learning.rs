@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    FeatureSet, FirmwareModule, Module, Network, Plant, Rows, Run, Start,
+    FeatureSet, FirmwareModule, Module, Network, NetworkModule, Plant, Rows, Run, Start,
     deployment::model_file,
     levenberg_marquardt::{self, Fit, train},
     samples::{Sampling, sample_tones},
@@ -54,6 +54,11 @@ impl Learned {
     /// The network.
     pub fn network(&self) -> &Network {
         &self.fit.network
+    }
+
+    /// The network in front of a plant, in f64.
+    pub fn module(&self) -> NetworkModule<'_> {
+        NetworkModule { set: &self.set, network: self.network() }
     }
 
     /// The firmware's model file.
@@ -136,7 +141,7 @@ pub fn assess(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{NetworkModule, fixtures, law::StateSpaceLaw};
+    use crate::{fixtures, law::StateSpaceLaw};
 
     fn desired(sample: i64) -> f64 {
         fixtures::test_trajectory(sample as f64 * fixtures::PERIOD)
@@ -148,8 +153,7 @@ mod tests {
         let law = StateSpaceLaw::new(&system);
         let learned = learn(&system, &FeatureSet::state_space(2, 1), &Settings::default()).unwrap();
         let samples = fixtures::test_samples(fixtures::PERIOD);
-        let wide = NetworkModule { set: &learned.set, network: learned.network() };
-        let found = assess(&system, &wide, &law, &desired, &Start::rest(), samples);
+        let found = assess(&system, &learned.module(), &law, &desired, &Start::rest(), samples);
         assert!(found.model_rms <= 1e-8 && found.tracking_rms <= 1e-8, "{} {}", found.model_rms, found.tracking_rms);
         for (precision, bound) in [(Precision::Float, 4e-7), (Precision::Int16, 1e-2), (Precision::Int8, 2e-2)] {
             let file = learned.file(precision, fixtures::PERIOD).unwrap();

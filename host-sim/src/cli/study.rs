@@ -44,7 +44,7 @@ impl Study {
 impl Lti {
     fn run(self, session: &Session) -> Result<()> {
         let mut settings = study::lti::Settings::default();
-        settings.learning.seed = session.configuration.seed;
+        settings.learning.seed = session.configuration.seed();
         settings.learning.restarts = self.restarts;
         settings.learning.training.iterations = self.iterations;
         show(session, "lti", &study::lti::run(&settings)?)

@@ -6,8 +6,7 @@
 
 use anyhow::Result;
 use impromptu_lti::{
-    FeatureSet, Learned, NetworkModule, Start, fixtures::position_and_difference, learn, learning::Settings, levenberg_marquardt,
-    simulate,
+    FeatureSet, Learned, Start, fixtures::position_and_difference, learn, learning::Settings, levenberg_marquardt, simulate,
 };
 
 use super::desired;
@@ -84,7 +83,7 @@ fn predicted(learned: &Learned, gain: f64, step: f64) -> f64 {
 /// Steady states after steps to several K.
 fn steps(study: &mut Study, learned: &Learned, gain: f64, key: &str, what: &str) -> [Curve; 2] {
     let system = position_and_difference(gain);
-    let module = NetworkModule { set: &learned.set, network: learned.network() };
+    let module = learned.module();
     let rest = |step: f64| {
         let run = simulate(&system, &module, &|_| step, &Start::rest(), SAMPLES);
         run.output[SAMPLES - 1]
@@ -115,7 +114,7 @@ fn steps(study: &mut Study, learned: &Learned, gain: f64, key: &str, what: &str)
 /// The test trajectory, and the same moved away from all that was trained on.
 fn shifted(study: &mut Study, learned: &Learned) {
     let system = position_and_difference(1.0);
-    let module = NetworkModule { set: &learned.set, network: learned.network() };
+    let module = learned.module();
     let plain = simulate(&system, &module, &desired, &Start::rest(), SAMPLES);
     let start = Start { state: vec![SHIFT, 0.0], ..Start::rest() };
     let moved = simulate(&system, &module, &|sample| desired(sample) + SHIFT, &start, SAMPLES);

@@ -3,7 +3,7 @@
 //! *in* S1 and its two networks; *out* row 13; *never* a module that sees the disturbance; *source* Zhou 2017, end of section III-B.
 
 use impromptu_lti::{
-    Learned, Module, NetworkModule, Run, Start,
+    Module, Run, Start,
     fixtures::{PERIOD, minimum_phase},
     law::{StateSpaceLaw, TransferFunctionLaw},
     simulate,
@@ -26,8 +26,7 @@ fn disturbance(sample: i64) -> f64 {
 
 pub(super) fn add(study: &mut Study, networks: &OfMinimumPhase) {
     let system = minimum_phase();
-    let module = |learned: &Learned| -> NetworkModule<'_> { NetworkModule { set: &learned.set, network: &learned.fit.network } };
-    let (state_space, transfer) = (module(&networks.state_space), module(&networks.transfer_function));
+    let (state_space, transfer) = (networks.state_space.module(), networks.transfer_function.module());
     let exact = (StateSpaceLaw::new(&system), TransferFunctionLaw::new(&system.transfer_function()));
     let modules: [(&str, &str, &dyn Module<f64>); 4] = [
         ("state_space_exact", "exact law, state", &exact.0),

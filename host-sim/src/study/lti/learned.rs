@@ -5,7 +5,7 @@
 
 use anyhow::Result;
 use impromptu_lti::{
-    Assessment, FeatureSet, FirmwareModule, Learned, Module, Moment, NetworkModule, Plant, Start, assess,
+    Assessment, FeatureSet, FirmwareModule, Learned, Module, Moment, Plant, Start, assess,
     fixtures::{PERIOD, test_samples},
     law::{StateSpaceLaw, TransferFunctionLaw},
     learn,
@@ -81,7 +81,7 @@ fn fly(
     let text = format!("steps of Levenberg-Marquardt, {what}");
     study.find(finding(system, &name, &[18], &text, steps, "").asked(Asked::AtMost(1000.0)));
     let assessed = |module: &dyn Module<f64>| assess(&system.model, module, law, &super::desired, &Start::rest(), samples());
-    let mut flown = vec![assessed(&NetworkModule { set: &learned.set, network: learned.network() })];
+    let mut flown = vec![assessed(&learned.module())];
     for (_, precision) in KERNELS {
         let file = learned.file(precision, PERIOD)?;
         flown.push(assessed(&FirmwareModule::new(&file, &learned.set)?));
