@@ -154,10 +154,16 @@ fn start(rows: &Rows, settings: &Settings, seed: u64) -> Network {
         DMatrix::from_fn(rows, columns, |_, _| deviation * random.sample::<f64, _>(StandardNormal))
     };
     let share = |inputs: usize| settings.initial / libm::sqrt(inputs as f64);
+    let envelope = rows.envelope();
+    let mut first = matrix(units, features, share(features));
+    // What never changed in training says nothing: in flight it must not matter.
+    for (mut column, _) in first.column_iter_mut().zip(&envelope).filter(|(_, (low, high))| low == high) {
+        column.fill(0.0);
+    }
     Network {
-        inputs: rows.envelope().into_iter().map(|(low, high)| Scaling::of(low, high)).collect(),
+        inputs: envelope.into_iter().map(|(low, high)| Scaling::of(low, high)).collect(),
         output: Scaling::of(rows.targets.min(), rows.targets.max()),
-        first: matrix(units, features, share(features)),
+        first,
         first_bias: matrix(units, 1, settings.initial).column(0).into_owned(),
         second: matrix(units, units, share(units)),
         second_bias: matrix(units, 1, settings.initial).column(0).into_owned(),
@@ -242,6 +248,18 @@ mod tests {
             let slope = (cost(1e-5) - cost(-1e-5)) / 2e-5;
             assert!((slope - gradient[parameter]).abs() < 1e-6 * (1.0 + gradient.amax()), "{slope} {}", gradient[parameter]);
         }
+    }
+
+    #[test]
+    fn a_feature_that_never_changed_in_training_does_not_matter_in_flight() {
+        let rows = sample_tones(
+            &fixtures::position_and_difference(1.0),
+            &FeatureSet::state_space(2, 2).difference(),
+            &tones(),
+            &Sampling { rows: 4, ..Sampling::default() },
+        );
+        let network = train(&rows, &Settings { units: 4, iterations: 5, ..Settings::default() }, 1).network;
+        assert_eq!(network.evaluate(&[0.0, 0.1, 0.2]), network.evaluate(&[3.0, 0.1, 0.2]));
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Lemma 1: difference learning on loops of unit and of other DC gain.
 //!
 //! *in* a loop with y = x₁ and x₂ = 0 in steady state, of three DC gains; *out* rows 14 to 16; *never* a prediction from the run that it
-//! predicts: it follows from the network and K₀ alone; *source* Zhou 2017, section III-C. The paper's prediction y_ss = K₀ (K + b) has the
-//! network's constant output b; where the network also reads x₁ - y_d, b is its output at the error that remains, so y_ss is a fixed point.
+//! predicts: it follows from the network and K₀ alone; *source* Zhou 2017, section III-C: y_ss = K₀ (K + b), b being the network's output for
+//! inputs that are all zero. In training y(t) stands where y_d(t) stands in flight, so x₁ - y_d is always zero there and is not learned.
 
 use anyhow::Result;
 use impromptu_lti::{
@@ -24,6 +24,8 @@ const STEPS: [i32; 9] = [-4, -3, -2, -1, 0, 1, 2, 3, 4];
 const NAMED: [(i32, &str); 3] = [(1, "step_1"), (2, "step_2"), (-3, "step_minus_3")];
 /// Long enough for any of the loops to come to rest.
 const SAMPLES: usize = 3000;
+/// Samples in which the desired output rises to K: a jump would leave the training data.
+const RISE: f64 = 1000.0;
 const SHIFT: f64 = 10.0;
 
 pub(super) fn add(study: &mut Study, settings: &Settings) -> Result<()> {
@@ -55,37 +57,23 @@ pub(super) fn add(study: &mut Study, settings: &Settings) -> Result<()> {
     study.note(
         SECTION,
         "Without steady-state error the network would have to add K / K0 - K, another number for each K, to the same inputs: only K0 = 1 lets it. \
-         State features soften the error, because the error that remains is one of the inputs, and cannot remove it.",
+         The steady state is K0 (K + b) with the one b that training left. The state does not help: in training y_d(t) is y(t), so that x1 - y_d is \
+         always zero there.",
     );
     Ok(())
 }
 
-/// The network for a row of difference features that are all zero, but the error of x₁ if it reads that.
-fn bias(learned: &Learned, error: f64) -> f64 {
-    let reads = |feature: &impromptu_firmware::features::Feature| {
-        feature.source == impromptu_firmware::features::Source::Measured && feature.channel == 0
-    };
-    let inputs: Vec<f64> = learned.set.features.iter().map(|feature| if reads(feature) { error } else { 0.0 }).collect();
-    learned.network().evaluate(&inputs)
-}
-
-/// y with y = K₀ (K + b(y - K)), by bisection.
+/// K₀ (K + b).
 fn predicted(learned: &Learned, gain: f64, step: f64) -> f64 {
-    let excess = |output: f64| output - gain * (step + bias(learned, output - step));
-    let (mut low, mut high) = (step - 20.0, step + 20.0);
-    for _ in 0..80 {
-        let middle = f64::midpoint(low, high);
-        if excess(middle) < 0.0 { low = middle } else { high = middle }
-    }
-    f64::midpoint(low, high)
+    gain * (step + learned.network().evaluate(&vec![0.0; learned.set.features.len()]))
 }
 
-/// Steady states after steps to several K.
+/// Steady states at several K.
 fn steps(study: &mut Study, learned: &Learned, gain: f64, key: &str, what: &str) -> [Curve; 2] {
     let system = position_and_difference(gain);
     let module = learned.module();
     let rest = |step: f64| {
-        let run = simulate(&system, &module, &|_| step, &Start::rest(), SAMPLES);
+        let run = simulate(&system, &module, &|sample| step * (sample as f64 / RISE).min(1.0), &Start::rest(), SAMPLES);
         run.output[SAMPLES - 1]
     };
     let states: Vec<(f64, f64, f64)> = STEPS.map(f64::from).map(|step| (step, rest(step), predicted(learned, gain, step))).into();

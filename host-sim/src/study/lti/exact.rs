@@ -82,5 +82,9 @@ fn laws<T: Scalar>(study: &mut Study, system: &System, precision: &str) -> Vec<f
             study.find(finding(system, &name, &rows, &what, sample as f64, "samples"));
         }
     }
+    let largest = state_space.reference.iter().take(minute).fold(0.0, |largest: f64, value| largest.max(value.wide().abs()));
+    let name = format!("exact_reference_largest_{precision}");
+    let what = format!("largest reference of the exact law over 60 s, {precision}; training has up to 5");
+    study.find(finding(system, &name, &[8, 19], &what, largest, ""));
     state_space.errors()
 }
