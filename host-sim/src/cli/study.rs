@@ -23,6 +23,8 @@ pub(super) struct Study {
 
 #[derive(Debug, Subcommand)]
 enum Subject {
+    /// Linear systems: exact laws, learned inverse, feature sets, difference learning (Insight 1, Lemma 1).
+    Lti(Lti),
     /// 12 and 36 inputs, reference points, training signals, rates, sizes, 30 strokes (Insights 2 and 3).
     Quadrotor {
         /// Few flights and epochs: other numbers, in a fraction of the time.
@@ -40,6 +42,7 @@ enum Subject {
 impl Study {
     pub(super) fn run(self, session: &Session) -> Result<()> {
         match self.subject {
+            Subject::Lti(lti) => lti.run(session),
             Subject::Quadrotor { quick } => {
                 let settings = if quick { QuadrotorSettings::quick() } else { QuadrotorSettings::default() };
                 let settings = QuadrotorSettings { seed: session.configuration.seed(), ..settings };
@@ -50,6 +53,27 @@ impl Study {
             Subject::Draws(command) => command.run(session),
             Subject::Merge(command) => command.run(session),
         }
+    }
+}
+
+/// Arguments of `study lti`.
+#[derive(Debug, Args)]
+struct Lti {
+    /// Networks trained for each system and feature set; the best in the f32 kernel is kept.
+    #[arg(long, default_value_t = study::lti::Settings::default().learning.restarts)]
+    restarts: usize,
+    /// Most steps of Levenberg-Marquardt.
+    #[arg(long, default_value_t = study::lti::Settings::default().learning.training.iterations)]
+    iterations: usize,
+}
+
+impl Lti {
+    fn run(self, session: &Session) -> Result<()> {
+        let mut settings = study::lti::Settings::default();
+        settings.learning.seed = session.configuration.seed();
+        settings.learning.restarts = self.restarts;
+        settings.learning.training.iterations = self.iterations;
+        show(session, "lti", &study::lti::run(&settings)?)
     }
 }
 

@@ -1,0 +1,59 @@
+//! Insight 1, the two feature sets and Lemma 1 on the paper's linear systems.
+//!
+//! *in* settings and a seed; *out* rows 3, 4, 6 to 8 and 12 to 19 as numbers and figures; *never* a choice made on the test trajectory;
+//! *source* Zhou 2017, sections III and V.
+
+mod difference;
+mod exact;
+mod features;
+mod learned;
+mod panel;
+
+use impromptu_lti::{StateSpace, fixtures, learning};
+use serde::{Deserialize, Serialize};
+
+use super::Study;
+
+/// How the study is run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// Learning of every network.
+    pub learning: learning::Settings,
+}
+
+/// One of the paper's systems.
+struct System {
+    /// In names of numbers.
+    key: &'static str,
+    /// In texts.
+    title: &'static str,
+    model: StateSpace,
+}
+
+fn systems() -> [System; 2] {
+    [
+        System { key: "s1", title: "S1 (zero 0.2)", model: fixtures::minimum_phase() },
+        System { key: "s2", title: "S2 (zero 1.002)", model: fixtures::non_minimum_phase() },
+    ]
+}
+
+/// The test trajectory at a sample.
+fn desired(sample: i64) -> f64 {
+    fixtures::test_trajectory(sample as f64 * fixtures::PERIOD)
+}
+
+/// Runs the study.
+///
+/// # Errors
+/// If the firmware refuses a network.
+pub fn run(settings: &Settings) -> anyhow::Result<Study> {
+    let mut study = Study::new("The add-on on linear systems", "host-sim study lti", settings.learning.seed);
+    exact::add(&mut study);
+    let state_space = learned::add(&mut study, &settings.learning)?;
+    features::add(&mut study, &state_space);
+    difference::add(&mut study, &settings.learning)?;
+    Ok(study)
+}
+
+#[cfg(test)]
+mod tests;

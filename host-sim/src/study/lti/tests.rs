@@ -1,0 +1,51 @@
+use impromptu_lti::{learning, levenberg_marquardt, samples::Sampling};
+
+use super::{Settings, run};
+
+/// Few rows and steps: what is asserted here does not need the last digits.
+fn quick() -> Settings {
+    let training = levenberg_marquardt::Settings { iterations: 30, units: 10, ..Default::default() };
+    let sampling = Sampling { rows: 12, ..Default::default() };
+    Settings { learning: learning::Settings { training, sampling, restarts: 1, ..Default::default() } }
+}
+
+#[test]
+fn the_papers_rows_on_linear_systems_come_out_as_it_states_them() {
+    let study = run(&quick()).unwrap();
+    let value = |name: &str| study.value(name).unwrap_or_else(|| panic!("no number {name}"));
+    for row in [3, 4, 6, 7, 8, 12, 13, 14, 16, 17, 18, 19] {
+        assert!(study.findings.iter().any(|finding| finding.rows.contains(&row)), "row {row} is missing");
+    }
+    assert!(value("s1_state_space_tracking_rms_f64") < 1e-5 && value("s1_state_space_tracking_rms_int8") < 0.05);
+    // S2: lost, although the module is learned.
+    assert!(value("s2_state_space_tracking_rms_f64") > 1.0 && value("s2_exact_state_space_law_lost_f32") < 6_500.0);
+    assert!(value("s2_inverse_is_stable") == 0.0 && value("s1_inverse_is_stable") == 1.0);
+    // State features correct an initial error within r samples; transfer-function features wait for the loop.
+    assert!(value("state_space_exact_settling") <= 1.0 && value("transfer_function_exact_settling") >= 5.0);
+    assert!((value("state_space_exact_disturbed") - 0.5).abs() < 1e-9);
+    assert!((value("transfer_function_exact_disturbed") - 8.0 / 7.0).abs() < 1e-9);
+    // Lemma 1.
+    for name in ["unit_gain", "gain_0_7", "gain_1_5"] {
+        for set in ["state_space", "desired_only"] {
+            assert!(value(&format!("{name}_{set}_lemma_error")) < 1e-6);
+        }
+    }
+    for set in ["state_space", "desired_only"] {
+        assert!(value(&format!("unit_gain_{set}_largest_error")) < 1e-3);
+        assert!(value(&format!("gain_0_7_{set}_largest_error")) > 1.0 && value(&format!("gain_1_5_{set}_largest_error")) > 1.5);
+    }
+    assert!(value("translation_error") < 1e-9);
+}
+
+#[test]
+fn every_number_and_figure_has_a_name_of_its_own_and_is_finite() {
+    let study = run(&quick()).unwrap();
+    let mut names: Vec<&str> = study.findings.iter().map(|finding| finding.name.as_str()).collect();
+    names.extend(study.figures.iter().map(|figure| figure.name.as_str()));
+    let count = names.len();
+    names.sort_unstable();
+    names.dedup();
+    assert_eq!(names.len(), count);
+    assert!(study.findings.iter().all(|finding| finding.value.is_finite()));
+    assert!(study.figures.iter().all(|figure| figure.curves.len() <= 6));
+}
