@@ -261,6 +261,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.feedback.applied(self.model, &applied.feedback);
         if acting || self.lanes != Lanes::NONE {
             self.guard.excess(applied.excess);
+            self.guard.swing(card.lane.as_ref().filter(|_| engaged).map(|lane| (lane, &wanted.feedback)));
             if let Some(monitor) = self.model.monitor() {
                 let errors = feedback::monitored(self.model, tick, preview, measured, &errors);
                 self.guard.observe(monitor, &errors, &applied.shares);

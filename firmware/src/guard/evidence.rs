@@ -199,12 +199,12 @@ impl Evidence {
             *energy = finite_or_zero(*energy + (now - *energy) * weight);
         }
         let floor = settings.evidence_floor * monitor.promise();
-        let factor = settings.evidence_factor * settings.evidence_factor;
-        let worse = |with: f32, without: f32| with > factor * without + floor * floor;
+        let worse = |with: f32, without: f32, factor: f32| with > factor * factor * without + floor * floor;
+        let factor = settings.network_factor;
         let baseline = if past.usual > past.baseline { past.usual } else { past.baseline };
         let share = settings.evidence_share * settings.evidence_share * baseline;
         // While the network acts, what is measured must be worse too.
-        let network = worse(past.network_alone, baseline) && (!acts || worse(past.with, baseline));
-        self.harmful = [network, worse(past.with, past.without_feedback + share)];
+        let network = worse(past.network_alone, baseline, factor) && (!acts || worse(past.with, baseline, factor));
+        self.harmful = [network, worse(past.with, past.without_feedback + share, settings.evidence_factor)];
     }
 }

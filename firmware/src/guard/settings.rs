@@ -27,8 +27,10 @@ pub struct GuardSettings {
     pub saturated_s: f32,
     /// Late inferences in a row that trip.
     pub late_in_a_row: u16,
-    /// The error with a lane may be this factor of what it would be without,
+    /// The error with the feedback lane may be this factor of what it would be without,
     pub evidence_factor: f32,
+    /// and that with the network lane this one: where motors saturate both are guesses,
+    pub network_factor: f32,
     /// and besides this many times what the model promises,
     pub evidence_floor: f32,
     /// and with the feedback lane this share of what it would be without any correction.
@@ -39,6 +41,16 @@ pub struct GuardSettings {
     pub usual_s: f32,
     /// Trips by evidence after which a lane stays off until it is armed again.
     pub evidence_trips: u16,
+    /// The feedback lane makes a turn when it comes back from its farthest value by this many times its fast clamp, of 2 at most;
+    pub oscillation_swing: f32,
+    /// it oscillates at more turns than this
+    pub oscillation_turns: f32,
+    /// and more than this mean square, all axes added, in squares of their fast clamps,
+    pub oscillation_power: f32,
+    /// both forgotten with this time constant, s.
+    pub oscillation_s: f32,
+    /// Trips by oscillation after which the lane stays off until it is armed again: each return would swing again.
+    pub oscillation_trips: u16,
 }
 
 impl GuardSettings {
@@ -57,11 +69,17 @@ impl GuardSettings {
         saturated_s: 1.0,
         late_in_a_row: 5,
         evidence_factor: 1.2,
+        network_factor: 1.6,
         evidence_floor: 2.5,
         evidence_share: 0.15,
         evidence_s: 0.15,
         usual_s: 4.0,
         evidence_trips: 3,
+        oscillation_swing: 1.8,
+        oscillation_turns: 5.0,
+        oscillation_power: 1.0,
+        oscillation_s: 0.5,
+        oscillation_trips: 1,
     };
 }
 
