@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// When lanes trip and come back. Those of the evidence trip lanes in validation strokes only where
+/// When lanes trip and come back. Those of evidence and oscillation trip lanes in validation strokes only where
 /// motors saturate (1.7 times the speed).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -27,10 +27,10 @@ pub struct GuardSettings {
     pub saturated_s: f32,
     /// Late inferences in a row that trip.
     pub late_in_a_row: u16,
-    /// The error with the feedback lane may be this factor of what it would be without,
+    /// The error with a lane may be this factor of what it would be without,
     pub evidence_factor: f32,
-    /// and that with the network lane this one: where motors saturate both are guesses,
-    pub network_factor: f32,
+    /// with the network lane this one while the loop responds to the feedback lane too,
+    pub assisted_factor: f32,
     /// and besides this many times what the model promises,
     pub evidence_floor: f32,
     /// and with the feedback lane this share of what it would be without any correction.
@@ -69,15 +69,15 @@ impl GuardSettings {
         saturated_s: 1.0,
         late_in_a_row: 5,
         evidence_factor: 1.2,
-        network_factor: 1.6,
+        assisted_factor: 2.0,
         evidence_floor: 2.5,
         evidence_share: 0.15,
         evidence_s: 0.15,
         usual_s: 4.0,
         evidence_trips: 3,
-        oscillation_swing: 1.8,
-        oscillation_turns: 5.0,
-        oscillation_power: 1.0,
+        oscillation_swing: 1.9,
+        oscillation_turns: 6.0,
+        oscillation_power: 0.8,
         oscillation_s: 0.5,
         oscillation_trips: 1,
     };
