@@ -327,6 +327,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.feedback.applied(model, &applied.feedback);
         if acting || self.lanes != Lanes::NONE {
             guard.excess(applied.excess);
+            guard.swing(card.lane.as_ref().filter(|_| engaged).map(|lane| (lane, &wanted.feedback)));
             if let Some(monitor) = model.monitor() {
                 let errors = feedback::monitored(model, tick, preview, measured, &errors);
                 guard.observe(monitor, &errors, &applied.shares);

@@ -9,14 +9,20 @@
 
 mod evidence;
 mod monitor;
+mod oscillation;
 mod settings;
 mod watch;
 
-use crate::{adapter::Lanes, math::abs, model::Floats};
+use crate::{
+    adapter::Lanes,
+    math::abs,
+    model::{Floats, LaneLayout, MAX_AXES},
+};
 
 pub use evidence::Evidence;
 pub(crate) use evidence::Shares;
 pub use monitor::Monitor;
+use oscillation::Oscillation;
 pub use settings::GuardSettings;
 use watch::{Watch, leak};
 
@@ -36,11 +42,14 @@ pub enum Trip {
     Evidence = 4,
     /// Inferences that come too late (network lane).
     Late = 5,
+    /// A limit cycle (feedback lane).
+    Oscillation = 6,
 }
 
 impl Trip {
     /// All reasons, in the order of their indices.
-    pub const ALL: [Self; 6] = [Self::Envelope, Self::NotFinite, Self::Stale, Self::Saturated, Self::Evidence, Self::Late];
+    pub const ALL: [Self; 7] =
+        [Self::Envelope, Self::NotFinite, Self::Stale, Self::Saturated, Self::Evidence, Self::Late, Self::Oscillation];
 
     /// Index in [`Trips`]; the same in every version.
     pub fn index(self) -> usize {
@@ -56,6 +65,7 @@ impl Trip {
             Self::Saturated => "saturated",
             Self::Evidence => "evidence",
             Self::Late => "late",
+            Self::Oscillation => "oscillation",
         }
     }
 }
@@ -105,6 +115,7 @@ pub struct Guard {
     outside: u16,
     /// Recent share of ticks in which each lane asked for more than the bounds let pass.
     excess: [f32; 2],
+    oscillation: Oscillation,
     evidence: Evidence,
     trips: Trips,
 }
@@ -120,6 +131,7 @@ impl Guard {
             age: 0,
             outside: 0,
             excess: [0.0; 2],
+            oscillation: Oscillation::default(),
             evidence: Evidence::new(),
             trips: Trips::default(),
         }
@@ -183,6 +195,7 @@ impl Guard {
     pub(crate) fn restart(&mut self) {
         self.evidence.restart();
         self.excess = [0.0; 2];
+        self.oscillation = Oscillation::default();
     }
 
     /// Takes the features of a sub-rate tick and the box of those in training.
@@ -213,23 +226,25 @@ impl Guard {
         let late = findings.late >= settings.late_in_a_row.max(1);
         let [network_excess, feedback_excess] = self.excess.map(|share| share > settings.saturated_share);
         let [network_harms, feedback_harms] = self.evidence.harmful();
-        let first = |causes: [(bool, Trip); 6]| causes.into_iter().find(|(present, _)| *present).map(|(_, trip)| trip);
-        let cause = |own: [bool; 4]| {
-            let [outside, late, excess, harms] = own;
+        let swings = self.oscillation.present(settings);
+        let first = |causes: [(bool, Trip); 7]| causes.into_iter().find(|(present, _)| *present).map(|(_, trip)| trip);
+        let cause = |own: [bool; 5]| {
+            let [outside, late, swings, excess, harms] = own;
             first([
                 (findings.not_finite, Trip::NotFinite),
                 (stale, Trip::Stale),
                 (outside, Trip::Envelope),
                 (late, Trip::Late),
+                (swings, Trip::Oscillation),
                 (excess, Trip::Saturated),
                 (harms, Trip::Evidence),
             ])
         };
-        let network = cause([outside, late, network_excess, network_harms]).filter(|_| wanted.network);
-        let feedback = cause([false, false, feedback_excess, feedback_harms]).filter(|_| wanted.feedback);
+        let network = cause([outside, late, false, network_excess, network_harms]).filter(|_| wanted.network);
+        let feedback = cause([false, false, swings, feedback_excess, feedback_harms]).filter(|_| wanted.feedback);
         let hold = (settings.hold_s * self.rate_hz) as u32;
-        let network = self.network.tick(network, hold, settings.evidence_trips);
-        let feedback = self.feedback.tick(feedback, hold, settings.evidence_trips);
+        let network = self.network.tick(network, hold, settings);
+        let feedback = self.feedback.tick(feedback, hold, settings);
         for (trip, counts) in [(network, &mut self.trips.network), (feedback, &mut self.trips.feedback)] {
             if let Some(count) = trip.and_then(|trip| counts.get_mut(trip.index())) {
                 *count = count.saturating_add(1);
@@ -242,6 +257,14 @@ impl Guard {
         let decay = leak(1.0 / (self.settings.saturated_s * self.rate_hz));
         for (share, excess) in self.excess.iter_mut().zip(excess) {
             *share += (f32::from(u8::from(excess)) - *share) * decay;
+        }
+    }
+
+    /// Learns what the feedback lane asks for on each axis at a reference tick; `None` while it is not to act.
+    pub(crate) fn swing(&mut self, asked: Option<(&LaneLayout, &[f32; MAX_AXES])>) {
+        match asked {
+            Some((lane, wanted)) => self.oscillation.observe(lane, wanted, &self.settings, self.rate_hz),
+            None => self.oscillation = Oscillation::default(),
         }
     }
 

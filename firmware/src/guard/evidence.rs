@@ -165,7 +165,7 @@ impl Evidence {
         let mean = 1.0 / ticks;
         self.head = if self.head == 0 { monitor.taps().saturating_sub(1) } else { self.head - 1 };
         let mut now = Energies::default();
-        let mut acts = false;
+        let [mut acts, mut assisted] = [false; 2];
         for (((axis, response), pasts), error) in monitor.axes().iter().zip(&mut self.pasts).zip(&mut self.errors) {
             let with = *error * mean;
             *error = 0.0;
@@ -176,6 +176,8 @@ impl Evidence {
                 rest = others;
                 let responses = pasts.each_mut().map(|past| past.respond(taps, self.head, mean));
                 acts |= pasts[0].quiet == 0;
+                // As long as the loop responds to it.
+                assisted |= usize::from(pasts[1].quiet) < monitor.taps();
                 network += responses[0];
                 feedback += responses[1];
                 more += responses[2];
@@ -199,12 +201,13 @@ impl Evidence {
             *energy = finite_or_zero(*energy + (now - *energy) * weight);
         }
         let floor = settings.evidence_floor * monitor.promise();
-        let factor = settings.evidence_factor * settings.evidence_factor;
-        let worse = |with: f32, without: f32| with > factor * without + floor * floor;
+        let worse = |with: f32, without: f32, factor: f32| with > factor * factor * without + floor * floor;
+        // What the network does wrong the feedback lane mends, as far as it can be mended.
+        let factor = if assisted { settings.assisted_factor } else { settings.evidence_factor };
         let baseline = if past.usual > past.baseline { past.usual } else { past.baseline };
         let share = settings.evidence_share * settings.evidence_share * baseline;
         // While the network acts, what is measured must be worse too.
-        let network = worse(past.network_alone, baseline) && (!acts || worse(past.with, baseline));
-        self.harmful = [network, worse(past.with, past.without_feedback + share)];
+        let network = worse(past.network_alone, baseline, factor) && (!acts || worse(past.with, baseline, factor));
+        self.harmful = [network, worse(past.with, past.without_feedback + share, settings.evidence_factor)];
     }
 }

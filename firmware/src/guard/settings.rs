@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// When lanes trip and come back. Those of the evidence trip lanes in validation strokes only where
+/// When lanes trip and come back. Those of evidence and oscillation trip lanes in validation strokes only where
 /// motors saturate (1.7 times the speed).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -29,6 +29,8 @@ pub struct GuardSettings {
     pub late_in_a_row: u16,
     /// The error with a lane may be this factor of what it would be without,
     pub evidence_factor: f32,
+    /// with the network lane this one while the loop responds to the feedback lane too,
+    pub assisted_factor: f32,
     /// and besides this many times what the model promises,
     pub evidence_floor: f32,
     /// and with the feedback lane this share of what it would be without any correction.
@@ -39,6 +41,16 @@ pub struct GuardSettings {
     pub usual_s: f32,
     /// Trips by evidence after which a lane stays off until it is armed again.
     pub evidence_trips: u16,
+    /// The feedback lane makes a turn when it comes back from its farthest value by this many times its fast clamp, of 2 at most;
+    pub oscillation_swing: f32,
+    /// it oscillates at more turns than this
+    pub oscillation_turns: f32,
+    /// and more than this mean square, all axes added, in squares of their fast clamps,
+    pub oscillation_power: f32,
+    /// both forgotten with this time constant, s.
+    pub oscillation_s: f32,
+    /// Trips by oscillation after which the lane stays off until it is armed again: each return would swing again.
+    pub oscillation_trips: u16,
 }
 
 impl GuardSettings {
@@ -57,11 +69,17 @@ impl GuardSettings {
         saturated_s: 1.0,
         late_in_a_row: 5,
         evidence_factor: 1.2,
+        assisted_factor: 2.0,
         evidence_floor: 2.5,
         evidence_share: 0.15,
         evidence_s: 0.15,
         usual_s: 4.0,
         evidence_trips: 3,
+        oscillation_swing: 1.9,
+        oscillation_turns: 6.0,
+        oscillation_power: 0.8,
+        oscillation_s: 0.5,
+        oscillation_trips: 1,
     };
 }
 

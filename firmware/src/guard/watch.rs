@@ -1,6 +1,6 @@
 //! One lane's latch: trips at a cause, stays off while it lasts and for the hold time after it.
 
-use super::Trip;
+use super::{GuardSettings, Trip};
 use crate::math::clamp;
 
 /// State of one lane.
@@ -9,26 +9,26 @@ pub(super) struct Watch {
     tripped: bool,
     /// Reference ticks that must pass without a cause.
     rest: u32,
-    /// Trips by evidence since it was armed.
-    evidence: u16,
+    /// Trips since it was armed that the lane itself is to blame for.
+    strikes: u16,
     locked: bool,
 }
 
 impl Watch {
     /// Free to act.
-    pub(super) const ARMED: Self = Self { tripped: false, rest: 0, evidence: 0, locked: false };
+    pub(super) const ARMED: Self = Self { tripped: false, rest: 0, strikes: 0, locked: false };
 
     pub(super) fn tripped(&self) -> bool {
         self.tripped
     }
 
-    /// Forgets what the evidence said; a running hold time goes on.
+    /// Forgets what was said against the lane; a running hold time goes on.
     pub(super) fn unlock(&mut self) {
-        (self.evidence, self.locked) = (0, false);
+        (self.strikes, self.locked) = (0, false);
     }
 
     /// One reference tick with the cause that is present, if any; returns it if it trips the lane now.
-    pub(super) fn tick(&mut self, cause: Option<Trip>, hold: u32, evidence_trips: u16) -> Option<Trip> {
+    pub(super) fn tick(&mut self, cause: Option<Trip>, hold: u32, settings: &GuardSettings) -> Option<Trip> {
         let Some(trip) = cause else {
             self.rest = self.rest.saturating_sub(1);
             self.tripped &= self.rest > 0 || self.locked;
@@ -39,10 +39,13 @@ impl Watch {
             return None;
         }
         self.tripped = true;
-        if trip == Trip::Evidence {
-            self.evidence = self.evidence.saturating_add(1);
-            self.locked = self.evidence >= evidence_trips;
-        }
+        let most = match trip {
+            Trip::Evidence => settings.evidence_trips,
+            Trip::Oscillation => settings.oscillation_trips,
+            _ => return Some(trip),
+        };
+        self.strikes = self.strikes.saturating_add(1);
+        self.locked = self.strikes >= most;
         Some(trip)
     }
 }

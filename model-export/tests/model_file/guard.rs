@@ -180,6 +180,60 @@ fn what_the_evidence_speaks_against_again_and_again_stays_off_until_it_is_armed(
     assert!(flight[2999].trips.by_lane()[1] > 3);
 }
 
+/// A lane that is 20 cm per metre of error, its clamps at 5 cm, in a loop that goes to and fro by a metre.
+#[test]
+fn a_lane_that_swings_between_its_clamps_is_off_for_good_and_one_that_is_slow_or_small_is_not() {
+    let feedback = Lanes { network: false, feedback: true };
+    let fly = |half: i32, amplitude: f32| {
+        // Without the response of the loop there is no evidence.
+        let description = Description { monitor: None, ..guarded() };
+        let side = move |tick: i32| if (tick / half) % 2 == 0 { amplitude } else { -amplitude };
+        let lanes = move |tick: i32| if (900..910).contains(&tick) { Lanes::NONE } else { feedback };
+        let doing = move |tick: i32| Doing { measured: [1.0 + side(tick), 0.0], ..calm(lanes(tick)) };
+        fly(description, [0.0, 0.0], GuardSettings::default(), 1000, doing)
+    };
+    let swinging = fly(6, 1.0);
+    let settings = GuardSettings::default();
+    assert_eq!(swinging[850].trips, only(Trip::Oscillation, [0, 1]), "longer than the hold time, {settings:?}");
+    assert!(swinging[100].trips == only(Trip::Oscillation, [0, 1]), "within a second");
+    let (tick, off) = (&swinging[850], Lanes { network: false, feedback: false });
+    assert_eq!((tick.acting, bits(tick.reference)), (off, bits(tick.desired)));
+    // Switched off and on again.
+    assert!(swinging[915].acting.feedback && swinging[999].trips.by_lane()[1] == 2);
+    // At one clamp for long, and never near both.
+    for calm in [fly(50, 1.0), fly(6, 0.05)] {
+        assert_eq!(calm[850].trips, Trips::default());
+    }
+}
+
+#[test]
+fn inferences_that_come_too_late_trip_the_network_alone_until_they_are_in_time() {
+    let description = Description { monitor: None, ..guarded() };
+    let bytes = constant_model(description.clone(), [0.1, 0.0]);
+    let model = Model::from_bytes(&bytes).unwrap();
+    let mut adapter: Adapter<'_, 2, 2, 2> = Adapter::new(&model, &table(&description), 100.0, CAPACITY).unwrap();
+    adapter.switch(Lanes::BOTH);
+    adapter.defer();
+    let mut preview = Preview::<2, CAPACITY>::new([EndRule::Hold, EndRule::Zero], 0);
+    (0..20).for_each(|_| preview.push([1.0, 0.0]));
+    let mut seen = Vec::new();
+    for tick in 0..800 {
+        preview.push([1.0, 0.0]);
+        let in_time = !(200..400).contains(&tick);
+        if let Some(job) = adapter.begin(tick, &preview, &[1.0, 0.0]).filter(|_| in_time) {
+            adapter.deliver(job.run(model.network().unwrap(), &mut Scratch::<64>::new()));
+        }
+        let reference = adapter.finish(tick, &preview, &[1.0, 0.0]);
+        seen.push((reference[0], adapter.guard().trips(), adapter.guard().allowed(Lanes::BOTH)));
+    }
+    let late = GuardSettings::default().late_in_a_row as usize;
+    // Sub-rate ticks of ten reference ticks; the first late one is missed a reference tick later at the soonest.
+    assert_eq!(seen[200 + 10 * (late - 1)].1, Trips::default());
+    assert_eq!(seen[201 + 10 * late].1, only(Trip::Late, [1, 0]));
+    assert_eq!((seen[399].0, seen[399].2), (1.0, Lanes { network: false, feedback: true }));
+    assert_eq!((seen[799].0, seen[799].1, seen[799].2), (1.1, only(Trip::Late, [1, 0]), Lanes::BOTH));
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(60))]
 

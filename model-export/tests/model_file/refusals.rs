@@ -2,7 +2,7 @@
 
 use impromptu_firmware::{
     features::{Feature, Relative, Source},
-    model::{Card, MAX_FEATURES, Model, Refusal, Section, file},
+    model::{Card, MAX_AXES, MAX_FEATURES, MAX_INPUTS, Model, MonitorAxis, MonitorLayout, Refusal, Section, file},
 };
 use impromptu_model_export::Precision;
 
@@ -139,6 +139,35 @@ fn more_than_this_build_holds() {
     // A list that claims more than there is: damaged, and nothing to name.
     more[at..at + 2].copy_from_slice(&[0xff, 0x7f]);
     assert_eq!(Model::from_bytes(&assembled(&more, blob)).map(|_| ()).unwrap_err(), Refusal::Card);
+}
+
+/// The monitor's lists are one longer than this build holds, made from a card with a full list by repeating an item.
+#[test]
+fn more_of_the_monitor_than_this_build_holds() {
+    let bytes = small_model(Precision::Int8);
+    let (card, blob) = file::split(&bytes).unwrap();
+    let card: Card<'_> = postcard::from_bytes(card).unwrap();
+    let with = |edit: &dyn Fn(&mut MonitorLayout)| {
+        let mut card = card.clone();
+        edit(card.monitor.as_mut().unwrap());
+        postcard::to_allocvec(&card).unwrap()
+    };
+    let axis =
+        |inputs: usize| MonitorAxis { inputs: (0..inputs as u8).collect(), ..card.monitor.as_ref().unwrap().axes[0].clone() };
+    let refused = |full: &[u8], empty: &[u8], length: usize, item: &[u8]| {
+        // The list's length is the first byte that differs.
+        let at = full.iter().zip(empty).position(|(a, b)| a != b).unwrap();
+        assert_eq!((full[at], empty[at]), (length as u8, 0));
+        let more = [&full[..at], &[length as u8 + 1], item, &full[at + 1..]].concat();
+        Model::from_bytes(&assembled(&more, blob)).map(|_| ()).unwrap_err()
+    };
+    let axes = |count: usize| with(&|monitor| monitor.axes = (0..count).map(|_| axis(1)).collect());
+    let refusal = refused(&axes(MAX_AXES), &axes(0), MAX_AXES, &postcard::to_allocvec(&axis(1)).unwrap());
+    assert_eq!(refusal, Refusal::Shape { what: "number of monitor axes", found: 5, limit: MAX_AXES as u32 });
+    // The longest list counts, wherever it is.
+    let inputs = |count: usize| with(&|monitor| monitor.axes = [axis(1), axis(count)].into_iter().collect());
+    let refusal = refused(&inputs(MAX_INPUTS), &inputs(0), MAX_INPUTS, &[0]);
+    assert_eq!(refusal, Refusal::Shape { what: "number of monitor inputs", found: 3, limit: MAX_INPUTS as u32 });
 }
 
 #[test]
