@@ -66,7 +66,7 @@ fn fly(
             adapter.set_age(age);
             let reference = adapter.step(tick, &preview, &measured, &mut Scratch::new());
             let correction = [adapter.correction()[0], adapter.correction()[1]];
-            Tick { desired, reference, correction, trips: adapter.guard().trips(), acting: adapter.guard().allowed(lanes) }
+            Tick { desired, reference, correction, trips: adapter.trips(), acting: adapter.guard().unwrap().allowed(lanes) }
         })
         .collect()
 }
@@ -221,10 +221,10 @@ fn inferences_that_come_too_late_trip_the_network_alone_until_they_are_in_time()
         preview.push([1.0, 0.0]);
         let in_time = !(200..400).contains(&tick);
         if let Some(job) = adapter.begin(tick, &preview, &[1.0, 0.0]).filter(|_| in_time) {
-            adapter.deliver(job.run(model.network().unwrap(), &mut Scratch::<64>::new()));
+            adapter.deliver(job.run(model.network().unwrap(), &mut Scratch::<64>::sized()));
         }
         let reference = adapter.finish(tick, &preview, &[1.0, 0.0]);
-        seen.push((reference[0], adapter.guard().trips(), adapter.guard().allowed(Lanes::BOTH)));
+        seen.push((reference[0], adapter.trips(), adapter.guard().unwrap().allowed(Lanes::BOTH)));
     }
     let late = GuardSettings::default().late_in_a_row as usize;
     // Sub-rate ticks of ten reference ticks; the first late one is missed a reference tick later at the soonest.
