@@ -190,9 +190,14 @@ pub fn assess(record: &Record, settings: &Settings) -> Result<Assessment, Diagno
     let mut random = Xoshiro256PlusPlus::seed_from_u64(settings.seed);
     let draws = identified.draws(&record, settings.draws, &mut random);
     let measured: Vec<&[f64]> = record.segments.iter().map(|segment| segment.measured.as_slice()).collect();
-    let properties = Properties::of(&identified, &draws, &measured, record.period_s);
+    let mut properties = Properties::of(&identified, &draws, &measured, record.period_s);
     if properties.explained < LEAST_EXPLAINED {
         return Err(DiagnosisError::Unexplained { percent: 100.0 * properties.explained });
+    }
+    if divisor > 1 {
+        // The mean before decimation also looks half a tick ahead.
+        let degree = &mut properties.strict_degree;
+        (degree.low, degree.value, degree.high) = (degree.low.max(1), degree.value.max(1), degree.high.max(1));
     }
     // The mean before decimation leaves zeros at half the sub-rate that are its own, not the loop's.
     let trusted_hz = if divisor > 1 { 0.25 * sub_rate_hz } else { 0.5 * sub_rate_hz };

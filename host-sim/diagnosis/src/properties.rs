@@ -160,7 +160,8 @@ fn strict(identified: &Identified) -> RelativeDegree {
 fn reversal(model: &TransferFunction, horizon: usize) -> (f64, usize) {
     let gain = model.gain();
     let response = model.step_response(horizon);
-    let wrong = response.iter().map(|value| -value / gain).fold(0.0, f64::max);
+    // An answer in the tick of the step itself is the mean before decimation, not the loop.
+    let wrong = response.iter().skip(1).map(|value| -value / gain).fold(0.0, f64::max);
     if wrong < LEAST_REVERSAL {
         return (0.0, 0);
     }

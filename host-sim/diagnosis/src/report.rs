@@ -45,7 +45,7 @@ impl Diagnosis {
         text
     }
 
-    /// The lines as text for a terminal, broken at [`WIDTH`] characters.
+    /// The lines as text for a terminal, broken at 130 characters.
     pub fn text(&self, unit: &str) -> String {
         let lines = self.lines(unit);
         let label = lines.iter().map(|[label, _]| label.chars().count()).max().unwrap_or(0) + 2;

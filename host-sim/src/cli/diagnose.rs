@@ -206,13 +206,13 @@ fn steps(rate_hz: f64, seed: u64) -> Trajectory {
     let ticks = (SECONDS * rate_hz) as usize;
     let centre = [0.0, 0.0, 1.5];
     let mut samples = vec![Sample { position: centre, ..Sample::default() }; ticks];
-    for axis in 0..3 {
+    for (axis, middle) in centre.into_iter().enumerate() {
         // At rest for a second first.
         let mut tick = rate_hz as usize;
         while tick < ticks {
             let (height, held) = (random.random_range(-0.3..0.3), (random.random_range(1.0..4.0) * rate_hz) as usize);
             for sample in samples.iter_mut().skip(tick).take(held) {
-                sample.position[axis] = centre[axis] + height;
+                sample.position[axis] = middle + height;
             }
             tick += held.max(1);
         }

@@ -88,6 +88,7 @@ fn twenty_loops_are_judged_rightly_and_eighteen_predictions_hold() {
     let outcomes = outcomes(TEST_SEED, 20);
     let text: Vec<String> = outcomes.iter().map(Outcome::line).collect();
     let text = text.join("\n");
+    println!("{text}");
     assert!(outcomes.iter().all(|outcome| outcome.found.verdict == outcome.wanted()), "{text}");
     assert!(outcomes.iter().all(Outcome::degrees_right), "{text}");
     let covered = outcomes.iter().filter(|outcome| outcome.found.prediction.reduction_percent.contains(outcome.measured));

@@ -71,7 +71,7 @@ impl Known {
             offset: uniform(-0.5, 0.5),
         };
         let (white, slow) = (uniform(0.003, 0.03), uniform(0.002, 0.02));
-        let mut known = Self { model, minimum_phase, unit_gain, white, slow, steps: index % 3 != 0, level: 1.0 };
+        let mut known = Self { model, minimum_phase, unit_gain, white, slow, steps: !index.is_multiple_of(3), level: 1.0 };
         let quiet = known.model.simulate(&known.signal(3000, seed ^ 0xabcd));
         let mean = quiet.iter().sum::<f64>() / quiet.len() as f64;
         known.level = (quiet.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / quiet.len() as f64).sqrt();
