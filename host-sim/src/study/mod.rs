@@ -5,6 +5,7 @@
 
 pub mod quadrotor;
 pub mod robustness;
+pub mod extensions;
 pub mod lti;
 
 use serde::{Deserialize, Serialize};
