@@ -158,7 +158,7 @@ pub struct Draw {
 }
 
 impl Draw {
-    /// Mean reduction over the draw's flights with the given errors, per cent; a flight that left the numbers counts -100 %, or nothing where
+    /// Reductions of the draw's flights with the given errors, per cent; a flight that left the numbers counts -100 %, or nothing where
     /// the baseline did so too.
     pub fn reductions(&self, errors: &[Option<f64>]) -> Vec<f64> {
         let flights = self.baseline.iter().zip(errors);

@@ -18,6 +18,11 @@ const EFFORT_SECTION: &str = "What robustness costs";
 /// Reductions below this are drawn here, %: a lane that oscillates would leave the others no room.
 const FLOOR: f64 = -20.0;
 
+/// Lanes that fly, in names and in words, and their mean and worst reduction.
+type Way = (&'static str, &'static str, fn(&Comparison) -> (f64, f64));
+/// A margin in words, and where a design has it.
+type Margin = (&'static str, fn(&Design) -> f32);
+
 /// What the study does, in words.
 pub(super) fn explain(study: &mut Study, settings: &Settings) {
     let text = format!(
@@ -113,7 +118,7 @@ pub(super) fn tell_cases(study: &mut Study, plant: &Loop, flown: &[(&'static str
 
 pub(super) fn draw_deviations(study: &mut Study, plant: &Loop, flown: &Deviations) {
     let (slug, loop_name) = (slug(plant), name(plant));
-    let ways: [(&str, &str, fn(&Comparison) -> (f64, f64)); 2] =
+    let ways: [Way; 2] =
         [("both", "both lanes", Comparison::both_lanes), ("network", "network lane alone", Comparison::network_alone)];
     for (way, words, reduction) in ways {
         let curves = PARAMETERS.iter().zip(&flown.parameters).map(|(parameter, flown)| {
@@ -217,7 +222,7 @@ pub(super) fn draw_effort(study: &mut Study, plant: &Loop, designs: &[Design], b
         reduction,
         by_modulus,
     ));
-    let margins: [(&str, fn(&Design) -> f32); 3] = [
+    let margins: [Margin; 3] = [
         ("delay margin [100 ms]", |design| design.margins.delay_ms / 100.0),
         ("gain margin [1]", |design| design.margins.gain),
         ("modulus margin [1]", |design| design.margins.modulus),

@@ -17,11 +17,13 @@ const QUANTILES: [(&str, &str, f64); 3] = [
     ("hundredth", "a hundredth is worse", 0.01),
 ];
 
+/// Lanes that fly, in names and in words, and their errors.
+type Way = (&'static str, &'static str, fn(&Draw) -> &[Option<f64>]);
+
 /// Adds what a run found to a study; `slug` begins the names.
 pub fn tell(study: &mut Study, slug: &str, content: &Content) {
     let settings = &content.header.settings;
-    let ways: [(&str, &str, fn(&Draw) -> &[Option<f64>]); 2] =
-        [("network", "network lane alone", |draw| &draw.network), ("both", "both lanes", |draw| &draw.both)];
+    let ways: [Way; 2] = [("network", "network lane alone", |draw| &draw.network), ("both", "both lanes", |draw| &draw.both)];
     let mut curves = Vec::new();
     for (way, words, errors) in ways {
         let flights: Vec<Vec<f64>> = content.draws.iter().map(|draw| draw.reductions(errors(draw))).collect();
