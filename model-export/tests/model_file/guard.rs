@@ -66,7 +66,7 @@ fn fly(
             adapter.set_age(age);
             let reference = adapter.step(tick, &preview, &measured, &mut Scratch::new());
             let correction = [adapter.correction()[0], adapter.correction()[1]];
-            Tick { desired, reference, correction, trips: adapter.guard().trips(), acting: adapter.guard().allowed(lanes) }
+            Tick { desired, reference, correction, trips: adapter.trips(), acting: adapter.guard().unwrap().allowed(lanes) }
         })
         .collect()
 }
