@@ -37,7 +37,8 @@ struct Image {
 
 const IMAGES: [Image; 2] = [
     Image { bin: "crazyflie", levels: [&["DCMI", "CRYP"], &["SysTick"], &["USART3"]], ram: RAM, flash: &[], ends: &[] },
-    // Its queue of received bytes is larger by 1.5 KB: the host sends without a baud rate. Its panics print. `elf/mod.rs` proves that the tasks have none but in what talks to the host.
+    // Its queue of received bytes is larger by 1.5 KB: the host sends without a baud rate. Its panics print, and what talks to the host has
+    // some.
     Image {
         bin: "emulated",
         levels: [&["DCMI", "CRYP"], &["SysTick"], &["USART1"]],
