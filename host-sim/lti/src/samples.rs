@@ -60,14 +60,11 @@ impl Rows {
     }
 }
 
+/// A reference, sample by sample.
+pub type Reference = Box<dyn Fn(i64) -> f64 + Sync>;
+
 /// Runs the plant under each reference (from rest, `samples` of them) and picks `rows` samples at random.
-pub fn sample(
-    plant: &impl Plant<f64>,
-    set: &FeatureSet,
-    references: &[(Box<dyn Fn(i64) -> f64 + Sync>, usize)],
-    rows: usize,
-    seed: u64,
-) -> Rows {
+pub fn sample(plant: &impl Plant<f64>, set: &FeatureSet, references: &[(Reference, usize)], rows: usize, seed: u64) -> Rows {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut chosen = Vec::new();
     for (reference, samples) in references {
@@ -89,10 +86,10 @@ pub fn sample(
 /// Rows of tones.
 pub fn sample_tones(plant: &impl Plant<f64>, set: &FeatureSet, tones: &[Tone], sampling: &Sampling) -> Rows {
     let period = sampling.period;
-    let references: Vec<(Box<dyn Fn(i64) -> f64 + Sync>, usize)> = tones
+    let references: Vec<(Reference, usize)> = tones
         .iter()
         .map(|&tone| {
-            let reference: Box<dyn Fn(i64) -> f64 + Sync> = Box::new(move |sample| tone.at(sample, period));
+            let reference: Reference = Box::new(move |sample| tone.at(sample, period));
             (reference, tone.samples(period, sampling.least_samples))
         })
         .collect();

@@ -99,7 +99,7 @@ impl<T: Scalar> Run<T> {
 
     /// First sample at which |y - y_d| is above `limit`, or not a number.
     pub fn first_error_above(&self, limit: f64) -> Option<usize> {
-        self.errors().iter().position(|error| !(error.abs() <= limit))
+        self.errors().iter().position(|error| error.is_nan() || error.abs() > limit)
     }
 
     /// The moment of a sample, as the module saw it.

@@ -58,7 +58,8 @@ pub(super) fn add(study: &mut Study, settings: &Settings) -> Result<()> {
         SECTION,
         "Without steady-state error the network would have to add K / K0 - K, another number for each K, to the same inputs: only K0 = 1 lets it. \
          The steady state is K0 (K + b) with the one b that training left. The state does not help: in training y_d(t) is y(t), so that x1 - y_d is \
-         always zero there.",
+         always zero there. With state features and K0 other than 1 the loop does not even come to rest: what the network made of a one-to-many \
+         target destabilises it, and the numbers found are those of the last sample.",
     );
     Ok(())
 }
@@ -89,7 +90,10 @@ fn steps(study: &mut Study, learned: &Learned, gain: f64, key: &str, what: &str)
     }
     let apart = states.iter().map(|(_, found, predicted)| (found - predicted).abs()).fold(0.0, f64::max);
     let text = format!("{title}: largest difference of steady state and K0 (K + b) over nine K");
-    study.find(Finding::new(SECTION, &format!("{key}_lemma_error"), &[16], &text, apart, "").asked(Asked::AtMost(1e-6)));
+    let apart = Finding::new(SECTION, &format!("{key}_lemma_error"), &[16], &text, apart, "");
+    // A loop that does not come to rest has no steady state to be asked for.
+    let rests = gain == 1.0 || key.ends_with("desired_only");
+    study.find(if rests { apart.asked(Asked::AtMost(1e-6)) } else { apart });
     let worst = states.iter().map(|(step, found, _)| (found - step).abs()).fold(0.0, f64::max);
     let text = format!("{title}: largest steady-state error over nine K");
     study.find(Finding::new(SECTION, &format!("{key}_largest_error"), &[16], &text, worst, ""));
