@@ -221,7 +221,7 @@ fn inferences_that_come_too_late_trip_the_network_alone_until_they_are_in_time()
         preview.push([1.0, 0.0]);
         let in_time = !(200..400).contains(&tick);
         if let Some(job) = adapter.begin(tick, &preview, &[1.0, 0.0]).filter(|_| in_time) {
-            adapter.deliver(job.run(model.network().unwrap(), &mut Scratch::<64>::new()));
+            adapter.deliver(job.run(model.network().unwrap(), &mut Scratch::new()));
         }
         let reference = adapter.finish(tick, &preview, &[1.0, 0.0]);
         seen.push((reference[0], adapter.guard().trips(), adapter.guard().allowed(Lanes::BOTH)));
