@@ -3,10 +3,10 @@
 //! *in* settings and a seed; *out* a [`Study`]: numbers and figures by name; *never* a number without a name, or one that the report shows and
 //! the JSON document lacks; *source* Zhou 2017 and the rows of its promises (1 to 31).
 
-pub mod quadrotor;
-pub mod robustness;
 pub mod extensions;
 pub mod lti;
+pub mod quadrotor;
+pub mod robustness;
 
 use serde::{Deserialize, Serialize};
 
