@@ -31,6 +31,8 @@ pub mod guard;
 
 pub mod adapter;
 
+pub mod region;
+
 pub mod control;
 
 pub mod quadrotor;
