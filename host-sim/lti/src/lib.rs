@@ -14,12 +14,17 @@
 //! The desired output, the reference and the states are pure numbers, time is counted in samples.
 
 pub mod deployment;
+pub mod extensions;
 pub mod feature_set;
 pub mod fixtures;
+pub mod lag;
 pub mod law;
 pub mod learning;
 pub mod levenberg_marquardt;
+pub mod linear_map;
+pub mod multisine;
 pub mod network;
+pub mod nonlinear;
 pub mod normal_equations;
 pub mod polynomial;
 pub mod samples;
@@ -28,13 +33,17 @@ pub mod signal;
 pub mod simulation;
 pub mod state_space;
 pub mod transfer_function;
+pub mod window;
 
 pub use deployment::FirmwareModule;
 pub use feature_set::FeatureSet;
 pub use learning::{Assessment, Learned, assess, learn};
+pub use linear_map::LinearMap;
+pub use multisine::Multisine;
 pub use network::{Network, NetworkModule};
 pub use samples::Rows;
 pub use scalar::Scalar;
 pub use simulation::{Module, Moment, Plant, Run, Start, simulate};
 pub use state_space::StateSpace;
 pub use transfer_function::TransferFunction;
+pub use window::Window;

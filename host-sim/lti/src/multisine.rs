@@ -29,9 +29,10 @@ impl Multisine {
 
     /// The signal at `seconds`.
     pub fn at(&self, seconds: f64) -> f64 {
-        let tones = self.tones.iter().map(|[amplitude, frequency, phase]| {
-            amplitude * libm::sin(std::f64::consts::TAU * frequency * seconds + phase)
-        });
+        let tones = self
+            .tones
+            .iter()
+            .map(|[amplitude, frequency, phase]| amplitude * libm::sin(std::f64::consts::TAU * frequency * seconds + phase));
         self.offset + tones.sum::<f64>()
     }
 
