@@ -89,20 +89,14 @@ impl Module<f64> for Window {
     }
 }
 
-/// Offsets of a window that is dense where the inverse changes fast, and at most 1 s apart where it decays: from half a second of past to
+/// Offsets of a window that is dense where the inverse changes fast, and half as dense where it decays: from half a second of past to
 /// `preview` samples ahead. `period` is the sampling period, s.
 pub fn offsets(preview: i64, period: f64) -> Vec<i64> {
     let samples = |seconds: f64| (seconds / period).round().max(1.0) as i64;
     let mut offsets = vec![-samples(0.5), -samples(0.25), 0];
     let mut offset = 0;
     while offset < preview {
-        let step = if offset < samples(5.0) {
-            0.25
-        } else if offset < samples(15.0) {
-            0.5
-        } else {
-            1.0
-        };
+        let step = if offset < samples(10.0) { 0.25 } else { 0.5 };
         offset = (offset + samples(step)).min(preview);
         offsets.push(offset);
     }
@@ -144,7 +138,7 @@ mod tests {
         let runs: Vec<_> = (0..12)
             .map(|seed| {
                 let signal = Multisine::random(8, [0.01, 0.3], 1.0, 2.0, seed);
-                let module = move |moment: &Moment<'_, f64>| signal.at(moment.sample as f64 * 0.01);
+                let module = move |moment: &Moment<'_, f64>| signal.risen(moment.sample as f64 * 0.01, 10.0);
                 simulate(&system, &module, &|_| 0.0, &Start::rest(), 9_000)
             })
             .collect();

@@ -31,6 +31,9 @@ struct Lti {
     /// Most steps of Levenberg-Marquardt.
     #[arg(long, default_value_t = study::lti::Settings::default().learning.training.iterations)]
     iterations: usize,
+    /// Folder of flight logs (CSV with px, py, sp_ctrltarget_x, sp_ctrltarget_y in m, every 40 ms; FAMILY_NUMBER_….csv) instead of those in the program.
+    #[arg(long, value_name = "DIR")]
+    logs: Option<std::path::PathBuf>,
 }
 
 impl Study {
@@ -47,7 +50,9 @@ impl Lti {
         settings.learning.seed = session.configuration.seed();
         settings.learning.restarts = self.restarts;
         settings.learning.training.iterations = self.iterations;
-        show(session, "lti", &study::lti::run(&settings)?)
+        let mut study = study::lti::run(&settings)?;
+        study::extensions::add(&mut study, session.configuration.seed, self.logs.as_deref())?;
+        show(session, "lti", &study)
     }
 }
 

@@ -3,6 +3,7 @@
 //! *in* settings and a seed; *out* a [`Study`]: numbers and figures by name; *never* a number without a name, or one that the report shows and
 //! the JSON document lacks; *source* Zhou 2017 and the rows of its promises (1 to 31).
 
+pub mod extensions;
 pub mod lti;
 
 use serde::{Deserialize, Serialize};

@@ -75,7 +75,8 @@ impl Flight {
         for (index, line) in lines.enumerate().filter(|line| !line.1.trim().is_empty()) {
             let fields: Vec<&str> = line.split(',').collect();
             for (column, place) in columns.iter_mut().zip(places) {
-                let number = fields.get(place).and_then(|field| field.trim().parse().ok()).filter(|value: &f64| value.is_finite());
+                let number =
+                    fields.get(place).and_then(|field| field.trim().parse().ok()).filter(|value: &f64| value.is_finite());
                 column.push(number.ok_or_else(|| FlightError::Row { name: name.into(), line: index + 2 })?);
             }
         }
