@@ -142,7 +142,7 @@ mod tests {
                 simulate(&system, &module, &|_| 0.0, &Start::rest(), 9_000)
             })
             .collect();
-        let window = Window::learn(&runs, &offsets(2_000, 0.01), 20, 1e-9).unwrap();
+        let window = Window::learn(&runs, &offsets(2_000, 0.01), 20, 1e-4).unwrap();
         let test = |sample: i64| fixtures::test_trajectory((sample - 2_000) as f64 * 0.01);
         let learned = simulate(&system, &window, &test, &Start::rest(), 8_000);
         let plain = simulate(&system, &|moment: &Moment<'_, f64>| moment.desired(0), &test, &Start::rest(), 8_000);

@@ -20,6 +20,9 @@ pub struct Signal {
 
 /// Length of every signal, s.
 pub const SECONDS: f64 = 60.0;
+/// Ridge of the learned window: what noise of 1 % in the logged outputs would do. Smooth signals hardly tell the taps apart; without it they are
+/// large, and the corner at a trajectory's end goes through them.
+pub const PENALTY: f64 = 1e-4;
 /// Band of the references in training, Hz.
 pub const BAND: [f64; 2] = [0.01, 1.0];
 
@@ -105,7 +108,7 @@ pub fn training_runs(seed: u64) -> Vec<Run<f64>> {
 
 /// A window of `seconds` of preview, learned.
 pub fn learn(runs: &[Run<f64>], seconds: f64) -> Option<Window> {
-    Window::learn(runs, &offsets((seconds / PERIOD).round() as i64, PERIOD), 20, 1e-9)
+    Window::learn(runs, &offsets((seconds / PERIOD).round() as i64, PERIOD), 20, PENALTY)
 }
 
 /// One run: the trajectory starts after `lead` s. Errors count while it lasts.
