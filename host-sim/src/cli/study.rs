@@ -51,7 +51,7 @@ impl Lti {
         settings.learning.restarts = self.restarts;
         settings.learning.training.iterations = self.iterations;
         let mut study = study::lti::run(&settings)?;
-        study::extensions::add(&mut study, session.configuration.seed, self.logs.as_deref())?;
+        study::extensions::add(&mut study, session.configuration.seed(), self.logs.as_deref())?;
         show(session, "lti", &study)
     }
 }
