@@ -9,12 +9,11 @@ mod feedback;
 mod inference;
 mod lanes;
 mod ramp;
-mod seat;
 mod signals;
 
 use crate::{
     features,
-    guard::{Findings, Guard, GuardSettings, Trip, Trips, finite},
+    guard::{Findings, Guard, GuardSettings, Trips, finite},
     math::finite_or_zero,
     model::{Card, Channels, Interpolation, MAX_FEATURES, MAX_OUTPUTS, Model, Refusal},
     network::Scratch,
@@ -26,7 +25,6 @@ pub use inference::{Inference, Job};
 use lanes::Fade;
 pub use lanes::Lanes;
 use ramp::Ramp;
-use seat::{Seat, Tied};
 use signals::{History, View, base_channels, same_signals};
 
 /// Sub-rate ticks of measured and reference history that features can read.
@@ -39,7 +37,8 @@ pub const HISTORY: usize = 16;
 /// control loop interrupts, until the next reference tick ([`Adapter::defer`]).
 #[derive(Debug)]
 pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
-    tied: Seat<Tied<'m>>,
+    model: Option<&'m Model<'m>>,
+    guard: Guard,
     /// Desired channel from which each reference channel starts.
     base: [usize; R],
     measured: History<M>,
@@ -50,8 +49,6 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
     feedback: Feedback,
     /// Lanes that are wanted.
     lanes: Lanes,
-    /// The guard's trips before [`Adapter::restart`].
-    past_trips: Trips,
     /// How far each lane is faded in, 0..=1.
     network_weight: f32,
     feedback_weight: f32,
@@ -64,7 +61,8 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     /// something that is one, and [ties](Adapter::tie) it there.
     pub const fn parked() -> Self {
         Self {
-            tied: Seat::Vacant,
+            model: None,
+            guard: Guard::VACANT,
             base: [0; R],
             measured: History::new([EndRule::Hold; M], 0),
             references: History::new([EndRule::Hold; R], 0),
@@ -72,7 +70,6 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             deferred: false,
             feedback: Feedback::REST,
             lanes: Lanes::NONE,
-            past_trips: Trips { network: [0; Trip::ALL.len()], feedback: [0; Trip::ALL.len()] },
             network_weight: 0.0,
             feedback_weight: 0.0,
             correction: Correction::NONE,
@@ -114,7 +111,8 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
 
     /// Makes this, in its place, what [`Adapter::new`] makes of a model that passes [`Adapter::check`]. With another one it is as safe, and of no use.
     pub fn tie(&mut self, model: &'m Model<'m>, table: &Channels<'_>) {
-        guarded(&mut self.tied, model);
+        self.model = Some(model);
+        self.guard.tie(GuardSettings::default(), model.card().timing.reference_rate_hz);
         self.base = base_channels(table);
         (self.deferred, self.loop_gain) = (false, 1.0);
         self.restart();
@@ -125,7 +123,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.reset();
         self.ramp = Ramp::EMPTY;
         self.correction = Correction::NONE;
-        self.past_trips = self.guard().map(Guard::trips).unwrap_or_default();
+        self.guard.renew();
         self.switch(Lanes::NONE);
     }
 
@@ -138,58 +136,43 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.feedback.reset();
         (self.network_weight, self.feedback_weight) = (0.0, 0.0);
         self.correction.values = [0.0; MAX_OUTPUTS];
-        if let Some(Tied { guard, .. }) = self.tied.as_mut() {
-            guard.land();
-        }
+        self.guard.land();
     }
 
     /// The model that is flown.
     pub fn model(&self) -> Option<&'m Model<'m>> {
-        self.tied.as_ref().map(|tied| tied.model)
+        self.model
     }
 
     /// Switches lanes; they are faded in and out over the model's fade time.
     pub fn switch(&mut self, lanes: Lanes) {
         self.lanes = lanes;
-        if let Some(Tied { guard, .. }) = self.tied.as_mut() {
-            guard.switched(lanes);
-        }
+        self.guard.switched(lanes);
     }
 
     /// Which lanes the guard lets act, and its evidence.
     pub fn guard(&self) -> Option<&Guard> {
-        self.tied.as_ref().map(|tied| &tied.guard)
+        self.model.map(|_| &self.guard)
     }
 
     /// The guard's trips since the model came, or [`Adapter::restart`].
     pub fn trips(&self) -> Trips {
-        let mut trips = self.guard().map(Guard::trips).unwrap_or_default();
-        let Trips { network, feedback } = &self.past_trips;
-        for (trips, past) in [(&mut trips.network, network), (&mut trips.feedback, feedback)] {
-            trips.iter_mut().zip(past).for_each(|(count, past)| *count = count.saturating_sub(*past));
-        }
-        trips
+        self.guard.trips()
     }
 
     /// Sets the guard, which is on with [`GuardSettings::default`] from the start.
     pub fn set_guard(&mut self, settings: GuardSettings) {
-        if let Some(Tied { guard, .. }) = self.tied.as_mut() {
-            guard.set(settings);
-        }
+        self.guard.set(settings);
     }
 
     /// Lets lanes act again that the guard has locked out.
     pub fn rearm(&mut self) {
-        if let Some(Tied { guard, .. }) = self.tied.as_mut() {
-            guard.rearm();
-        }
+        self.guard.rearm();
     }
 
     /// Tells how many reference ticks ago the newest measurement arrived; 0 from the start.
     pub fn set_age(&mut self, ticks: u16) {
-        if let Some(Tied { guard, .. }) = self.tied.as_mut() {
-            guard.set_age(ticks);
-        }
+        self.guard.set_age(ticks);
     }
 
     /// Multiplies what the loop receives of the feedback lane, unknown to the lane: the loop gain of a robustness test. 1 in flight.
@@ -252,7 +235,8 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     pub fn begin_into<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M], job: &mut Job) -> bool {
         // A ramp ends where the inference of its start says, which is needed from the next reference tick on.
         self.ramp.settle(tick);
-        let Some(Tied { model, guard }) = self.tied.as_mut() else { return false };
+        let Some(model) = self.model else { return false };
+        let guard = &mut self.guard;
         let divisor = divisor(model.card());
         if tick.rem_euclid(divisor) != 0 {
             return false;
@@ -296,8 +280,9 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     pub fn finish<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M]) -> [f32; R] {
         let desired = preview.sample(tick);
         let mut reference = base(&self.base, &desired);
-        let Some(Tied { model, guard }) = self.tied.as_mut() else { return reference };
-        let (model, card) = (*model, model.card());
+        let Some(model) = self.model else { return reference };
+        let guard = &mut self.guard;
+        let card = model.card();
         let divisor = divisor(card);
         let interpolation = card.timing.interpolation;
         if interpolation == Interpolation::Hold && !self.deferred {
@@ -353,10 +338,4 @@ fn base<const R: usize>(channels: &[usize; R], desired: &[f32]) -> [f32; R] {
 /// Reference ticks in a sub-rate tick. A checked model has at least one; here the compiler sees it too and leaves no panic.
 fn divisor(card: &Card<'_>) -> i32 {
     i32::from(card.timing.divisor).max(1)
-}
-
-/// A model with a new guard. Apart from all else, since the guard is made on the stack: 3.5 KB.
-#[inline(never)]
-fn guarded<'m>(seat: &mut Seat<Tied<'m>>, model: &'m Model<'m>) {
-    *seat = Seat::Taken(Tied { model, guard: Guard::new(GuardSettings::default(), model.card().timing.reference_rate_hz) });
 }

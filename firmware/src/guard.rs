@@ -80,6 +80,9 @@ pub struct Trips {
 }
 
 impl Trips {
+    /// None.
+    pub const NONE: Self = Self { network: [0; Trip::ALL.len()], feedback: [0; Trip::ALL.len()] };
+
     /// Trips of the network lane and of the feedback lane.
     pub fn by_lane(&self) -> [u16; 2] {
         [self.network, self.feedback].map(|lane| lane.iter().fold(0, |sum, count| count.saturating_add(sum)))
@@ -121,20 +124,30 @@ pub struct Guard {
 }
 
 impl Guard {
-    /// A guard that has seen nothing yet, of a loop with this many reference ticks in a second.
-    pub fn new(settings: GuardSettings, rate_hz: f32) -> Self {
-        Self {
-            settings,
-            rate_hz,
-            network: Watch::ARMED,
-            feedback: Watch::ARMED,
-            age: 0,
-            outside: 0,
-            excess: [0.0; 2],
-            oscillation: Oscillation::default(),
-            evidence: Evidence::new(),
-            trips: Trips::default(),
-        }
+    /// A guard without a loop, which has seen nothing: all zeros, so that a static with it takes no flash.
+    pub(crate) const VACANT: Self = Self {
+        settings: GuardSettings::NONE,
+        rate_hz: 0.0,
+        network: Watch::ARMED,
+        feedback: Watch::ARMED,
+        age: 0,
+        outside: 0,
+        excess: [0.0; 2],
+        oscillation: Oscillation::NONE,
+        evidence: Evidence::NONE,
+        trips: Trips::NONE,
+    };
+
+    /// Makes this, in its place, a guard that has seen nothing yet, of a loop with this many reference ticks in a second.
+    pub(crate) fn tie(&mut self, settings: GuardSettings, rate_hz: f32) {
+        (self.settings, self.rate_hz) = (settings, rate_hz);
+        self.renew();
+    }
+
+    /// Forgets everything but the settings.
+    pub(crate) fn renew(&mut self) {
+        self.trips = Trips::NONE;
+        self.land();
     }
 
     /// Other settings; what was seen and counted stays.
@@ -195,7 +208,7 @@ impl Guard {
     pub(crate) fn restart(&mut self) {
         self.evidence.restart();
         self.excess = [0.0; 2];
-        self.oscillation = Oscillation::default();
+        self.oscillation = Oscillation::NONE;
     }
 
     /// Takes the features of a sub-rate tick and the box of those in training.
@@ -264,7 +277,7 @@ impl Guard {
     pub(crate) fn swing(&mut self, asked: Option<(&LaneLayout, &[f32; MAX_AXES])>) {
         match asked {
             Some((lane, wanted)) => self.oscillation.observe(lane, wanted, &self.settings, self.rate_hz),
-            None => self.oscillation = Oscillation::default(),
+            None => self.oscillation = Oscillation::NONE,
         }
     }
 

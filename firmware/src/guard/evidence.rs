@@ -33,23 +33,24 @@ pub(crate) struct Shares {
 struct Past {
     ring: [f32; MAX_TAPS],
     sum: f32,
-    /// Monitor ticks since it was other than zero.
-    quiet: u8,
+    /// Monitor ticks for which the loop still responds to it: as many as there are taps while it is other than zero.
+    left: u8,
 }
 
 impl Past {
-    const REST: Self = Self { ring: [0.0; MAX_TAPS], sum: 0.0, quiet: u8::MAX };
+    const REST: Self = Self { ring: [0.0; MAX_TAPS], sum: 0.0, left: 0 };
 
     /// Ends a monitor tick and returns the response to this contribution; `head` is the newest tick's place in the ring.
     fn respond(&mut self, response: Floats<'_>, head: usize, mean: f32) -> f32 {
         let newest = finite_or_zero(self.sum * mean);
         self.sum = 0.0;
-        self.quiet = if newest == 0.0 { self.quiet.saturating_add(1) } else { 0 };
+        let taps = response.len();
+        // There are at most MAX_TAPS, which a u8 holds.
+        self.left = if newest == 0.0 { self.left.saturating_sub(1) } else { taps as u8 };
         if let Some(place) = self.ring.get_mut(head) {
             *place = newest;
         }
-        let taps = response.len();
-        if usize::from(self.quiet) >= taps {
+        if self.left == 0 {
             return 0.0;
         }
         let ring = self.ring.get(..taps).unwrap_or_default();
@@ -91,21 +92,21 @@ pub struct Evidence {
     pasts: [[[Past; 3]; MAX_INPUTS]; MAX_AXES],
     energies: Energies,
     harmful: [bool; 2],
-    idle: bool,
+    /// Something was added since the start, or since all was forgotten.
+    busy: bool,
 }
 
 impl Evidence {
-    pub(super) const fn new() -> Self {
-        Self {
-            phase: 0,
-            head: 0,
-            errors: [0.0; MAX_AXES],
-            pasts: [[[Past::REST; 3]; MAX_INPUTS]; MAX_AXES],
-            energies: Energies { with: 0.0, without_feedback: 0.0, network_alone: 0.0, baseline: 0.0, usual: 0.0 },
-            harmful: [false; 2],
-            idle: true,
-        }
-    }
+    /// Nothing seen yet: all zeros.
+    pub(super) const NONE: Self = Self {
+        phase: 0,
+        head: 0,
+        errors: [0.0; MAX_AXES],
+        pasts: [[[Past::REST; 3]; MAX_INPUTS]; MAX_AXES],
+        energies: Energies { with: 0.0, without_feedback: 0.0, network_alone: 0.0, baseline: 0.0, usual: 0.0 },
+        harmful: [false; 2],
+        busy: false,
+    };
 
     /// Recent energies, the squares of the errors' unit, added over the axes.
     pub fn energies(&self) -> Energies {
@@ -119,7 +120,7 @@ impl Evidence {
 
     /// Forgets everything: no lane has acted for long, or ticks are missing.
     pub(crate) fn restart(&mut self) {
-        if self.idle {
+        if !self.busy {
             return;
         }
         // In place: as a whole it would be 3 KB of the control task's stack.
@@ -127,7 +128,7 @@ impl Evidence {
             *past = Past::REST;
         }
         (self.phase, self.head, self.errors) = (0, 0, [0.0; MAX_AXES]);
-        (self.energies, self.harmful, self.idle) = (Energies::default(), [false; 2], true);
+        (self.energies, self.harmful, self.busy) = (Energies::default(), [false; 2], false);
     }
 
     /// Adds a reference tick with the errors of the monitor's axes.
@@ -139,7 +140,7 @@ impl Evidence {
         settings: &GuardSettings,
         rate_hz: f32,
     ) {
-        self.idle = false;
+        self.busy = true;
         for (sum, error) in self.errors.iter_mut().zip(errors) {
             *sum += clamp(finite_or_zero(*error), -LARGEST, LARGEST);
         }
@@ -175,9 +176,9 @@ impl Evidence {
                 let (taps, others) = rest.split_at(monitor.taps());
                 rest = others;
                 let responses = pasts.each_mut().map(|past| past.respond(taps, self.head, mean));
-                acts |= pasts[0].quiet == 0;
+                acts |= usize::from(pasts[0].left) == monitor.taps();
                 // As long as the loop responds to it.
-                assisted |= usize::from(pasts[1].quiet) < monitor.taps();
+                assisted |= pasts[1].left > 0;
                 network += responses[0];
                 feedback += responses[1];
                 more += responses[2];

@@ -11,7 +11,7 @@ use super::{GuardSettings, watch::leak};
 use crate::model::{LaneLayout, MAX_AXES};
 
 /// One axis.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Swing {
     /// Farthest value since the last turn, in clamps,
     extreme: f32,
@@ -22,7 +22,7 @@ struct Swing {
 }
 
 /// Recent swings of the feedback lane, all axes together.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Oscillation {
     axes: [Swing; MAX_AXES],
     /// Recent turns.
@@ -32,6 +32,10 @@ pub(super) struct Oscillation {
 }
 
 impl Oscillation {
+    /// At rest.
+    pub(super) const NONE: Self =
+        Self { axes: [Swing { extreme: 0.0, rising: false, mean: 0.0 }; MAX_AXES], turns: 0.0, power: 0.0 };
+
     /// Whether the lane swings.
     pub(super) fn present(&self, settings: &GuardSettings) -> bool {
         self.turns > settings.oscillation_turns && self.power > settings.oscillation_power

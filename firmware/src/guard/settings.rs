@@ -57,6 +57,32 @@ impl GuardSettings {
     /// No guard.
     pub const OFF: Self = Self { enabled: false, ..Self::DEFAULT };
 
+    /// All zeros: what stands in the place of settings until a model comes.
+    pub(super) const NONE: Self = Self {
+        enabled: false,
+        hold_s: 0.0,
+        handover_s: 0.0,
+        envelope_margin: 0.0,
+        envelope_floor: 0.0,
+        envelope_ticks: 0,
+        stale_s: 0.0,
+        saturated_share: 0.0,
+        saturated_s: 0.0,
+        late_in_a_row: 0,
+        evidence_factor: 0.0,
+        assisted_factor: 0.0,
+        evidence_floor: 0.0,
+        evidence_share: 0.0,
+        evidence_s: 0.0,
+        usual_s: 0.0,
+        evidence_trips: 0,
+        oscillation_swing: 0.0,
+        oscillation_turns: 0.0,
+        oscillation_power: 0.0,
+        oscillation_s: 0.0,
+        oscillation_trips: 0,
+    };
+
     const DEFAULT: Self = Self {
         enabled: true,
         hold_s: 2.0,
