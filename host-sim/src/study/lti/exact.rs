@@ -44,7 +44,12 @@ pub(super) fn add(study: &mut Study) {
 }
 
 fn finding(system: &System, name: &str, rows: &[u8], what: &str, value: f64, unit: &str) -> Finding {
-    Finding::new(SECTION, &format!("{}_{name}", system.key), rows, &format!("{}: {what}", system.title), value, unit)
+    finding_in(SECTION, system, name, rows, what, value, unit)
+}
+
+/// A number of one of the systems.
+pub(super) fn finding_in(section: &str, system: &System, name: &str, rows: &[u8], what: &str, value: f64, unit: &str) -> Finding {
+    Finding::new(section, &format!("{}_{name}", system.key), rows, &format!("{}: {what}", system.title), value, unit)
 }
 
 fn properties(study: &mut Study, system: &System) {

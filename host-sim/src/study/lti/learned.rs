@@ -13,7 +13,7 @@ use impromptu_lti::{
 };
 use impromptu_model_export::Precision;
 
-use super::{System, panel, systems};
+use super::{System, exact::finding_in, panel, systems};
 use crate::{
     report::Axis,
     study::{Asked, Finding, Study},
@@ -64,7 +64,7 @@ fn samples() -> usize {
 }
 
 fn finding(system: &System, name: &str, rows: &[u8], what: &str, value: f64, unit: &str) -> Finding {
-    Finding::new(SECTION, &format!("{}_{name}", system.key), rows, &format!("{}: {what}", system.title), value, unit)
+    finding_in(SECTION, system, name, rows, what, value, unit)
 }
 
 /// Flies a network in f64 and in each kernel, in that order.

@@ -1,6 +1,6 @@
 //! Insight 1, the two feature sets and Lemma 1 on the paper's linear systems.
 //!
-//! *in* settings and a seed; *out* rows 3, 4, 6 to 8 and 12 to 19 as numbers and figures; *never* a choice made on the test trajectory;
+//! *in* settings and a seed; *out* rows 3, 4, 6 to 10 and 12 to 19 as numbers and figures; *never* a choice made on the test trajectory;
 //! *source* Zhou 2017, sections III and V.
 
 mod difference;
@@ -8,6 +8,7 @@ mod exact;
 mod features;
 mod learned;
 mod panel;
+mod step_test;
 
 use impromptu_lti::{StateSpace, fixtures, learning};
 use serde::{Deserialize, Serialize};
@@ -49,6 +50,7 @@ fn desired(sample: i64) -> f64 {
 pub fn run(settings: &Settings) -> anyhow::Result<Study> {
     let mut study = Study::new("The add-on on linear systems", "host-sim study lti", settings.learning.seed);
     exact::add(&mut study);
+    step_test::add(&mut study, settings.learning.seed)?;
     let state_space = learned::add(&mut study, &settings.learning)?;
     features::add(&mut study, &state_space);
     difference::add(&mut study, &settings.learning)?;

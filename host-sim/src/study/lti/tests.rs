@@ -13,13 +13,17 @@ fn quick() -> Settings {
 fn the_papers_rows_on_linear_systems_come_out_as_it_states_them() {
     let study = run(&quick()).unwrap();
     let value = |name: &str| study.value(name).unwrap_or_else(|| panic!("no number {name}"));
-    for row in [3, 4, 6, 7, 8, 12, 13, 14, 16, 17, 18, 19] {
+    for row in [3, 4, 6, 7, 8, 9, 10, 12, 13, 14, 16, 17, 18, 19] {
         assert!(study.findings.iter().any(|finding| finding.rows.contains(&row)), "row {row} is missing");
     }
     assert!(value("s1_state_space_tracking_rms_f64") < 1e-5 && value("s1_state_space_tracking_rms_int8") < 0.05);
     // S2: lost, although the module is learned.
     assert!(value("s2_state_space_tracking_rms_f64") > 1.0 && value("s2_exact_state_space_law_lost_f32") < 6_500.0);
     assert!(value("s2_inverse_is_stable") == 0.0 && value("s1_inverse_is_stable") == 1.0);
+    // What the log tells of them, before anything is learned.
+    assert_eq!([value("s1_step_degree"), value("s2_step_degree")], [1.0; 2]);
+    assert!(value("s1_step_reversal") == 0.0 && (6.0..=12.0).contains(&value("s2_step_reversal")));
+    assert!(value("s1_step_zero_high") < 1.0 && (value("s2_step_zero_low")..=value("s2_step_zero_high")).contains(&1.002));
     // State features correct an initial error within r samples; transfer-function features wait for the loop.
     assert!(value("state_space_exact_settling") <= 1.0 && value("transfer_function_exact_settling") >= 5.0);
     assert!((value("state_space_exact_disturbed") - 0.5).abs() < 1e-9);

@@ -16,7 +16,7 @@ use super::{
 use crate::{
     experiment::{Loop, Purpose, Recipe, build, derived, reduction},
     report::{Axis, Curve, Figure},
-    study::{Finding, Study},
+    study::{Asked, Finding, Study},
     trajectory::{STROKE_SPEED, stroke, strokes},
 };
 
@@ -72,6 +72,14 @@ pub(super) fn crazyflie(ground: &Ground<'_>, crazyflie: &Crazyflie, study: &mut 
     ] {
         flown.push((name, words, course.errors(plant, file, lanes)?));
     }
+    let switched_off = course.errors(plant, &models.int8, Lanes::NONE)?;
+    let difference = switched_off.iter().zip(&course.baseline).map(|(off, baseline)| (off - baseline).abs()).fold(0.0, f64::max);
+    let what = "largest difference between a flight with both lanes switched off and the baseline's";
+    study.find(Finding::new(section, "bypass_difference", &[1, 2], what, difference, "m").asked(Asked::AtMost(0.0)));
+    study.note(
+        section,
+        "Features are computed by the firmware's adapter in every flight and by the same function from the logs for training;          `host-sim fly --pil` flies the same strokes through the firmware on the emulated microcontroller, bit for bit.",
+    );
     if let Err(reason) = &built.lane {
         study.note(section, &format!("No feedback lane: {reason}."));
     }
