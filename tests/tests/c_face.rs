@@ -266,15 +266,14 @@ fn calls_from_c_need_no_more_stack_than_the_header_says() {
     println!("{used}");
     let used: serde_json::Map<String, serde_json::Value> = serde_json::from_str(&used).unwrap();
     let header = fs::read_to_string(c::include().join("impromptu.h")).unwrap();
-    for (call, kilobytes) in [("model_create", 4), ("adapter_create", 8), ("flight_attach", 8), ("flight_control", 4)] {
+    for (call, kilobytes) in [("model_create", 4), ("adapter_create", 4), ("flight_attach", 4), ("flight_control", 4)] {
         let prototype = header.find(&format!("impromptu_{call}(")).unwrap();
         let comment = &header[header[..prototype].rfind("\n\n").unwrap()..prototype];
         assert!(comment.contains(&format!("{kilobytes} KB of stack")), "{call}: {comment}");
     }
     for (call, bytes) in &used {
         let limit = match call.as_str() {
-            "model_create" | "flight_control" => 4_096,
-            "adapter_create" | "flight_attach" => 8_192,
+            "model_create" | "flight_control" | "adapter_create" | "flight_attach" => 4_096,
             _ => 2_048,
         };
         assert!(bytes.as_u64().unwrap() <= limit, "{call} needs {bytes} bytes of stack");

@@ -362,7 +362,7 @@ size_t impromptu_model_size(void);
 // Creates an adapter in `adapter`, which has `size` bytes, for a loop whose references run at `rate_hz`. Both lanes are off.
 //
 // `signals` is compared with the model's table, name by name; NULL takes the model's for the application's. The model must live as
-// long as the adapter. The first sample pushed will be that of reference tick `first_tick`. Needs up to 8 KB of stack.
+// long as the adapter. The first sample pushed will be that of reference tick `first_tick`. Needs up to 4 KB of stack.
 impromptu_status impromptu_adapter_create(struct impromptu_adapter *adapter,
                                           size_t size,
                                           const struct impromptu_model *model,
@@ -438,7 +438,7 @@ impromptu_status impromptu_flight_create(struct impromptu_flight *flight,
                                          const struct impromptu_flight_settings *settings);
 
 // Puts an add-on before the loop, with the lanes that are not 0 on. The model must live as long as the flight stack.
-// Needs up to 8 KB of stack.
+// Needs up to 4 KB of stack.
 impromptu_status impromptu_flight_attach(struct impromptu_flight *flight,
                                          const struct impromptu_model *model,
                                          int network,

@@ -20,7 +20,7 @@ use crate::{
 /// Creates an adapter in `adapter`, which has `size` bytes, for a loop whose references run at `rate_hz`. Both lanes are off.
 ///
 /// `signals` is compared with the model's table, name by name; NULL takes the model's for the application's. The model must live as
-/// long as the adapter. The first sample pushed will be that of reference tick `first_tick`. Needs up to 8 KB of stack.
+/// long as the adapter. The first sample pushed will be that of reference tick `first_tick`. Needs up to 4 KB of stack.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_adapter_create(
     adapter: *mut AdapterMemory,

@@ -35,7 +35,7 @@ pub unsafe extern "C" fn impromptu_flight_create(
 }
 
 /// Puts an add-on before the loop, with the lanes that are not 0 on. The model must live as long as the flight stack.
-/// Needs up to 8 KB of stack.
+/// Needs up to 4 KB of stack.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_flight_attach(
     flight: *mut FlightMemory,
