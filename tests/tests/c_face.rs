@@ -93,7 +93,7 @@ fn script(file: &[u8]) -> (Vec<u8>, Vec<u8>) {
     let mut flight = Flight::new(&settings).unwrap();
     flight.attach(&model, &settings, Lanes::NONE).unwrap();
     let rate = settings.rates.reference_hz();
-    let mut adapter = Adapter::<DESIRED, MEASURED, REFERENCE>::new(&model, &quadrotor::signals(), rate, PREVIEW).unwrap();
+    let mut adapter = Adapter::<DESIRED, MEASURED, REFERENCE>::new(&model, quadrotor::signals(), rate, PREVIEW).unwrap();
     adapter.defer();
     let mut preview = Preview::<DESIRED, PREVIEW>::new(quadrotor::END_RULES, 0);
     let mut scratch = Scratch::new();
@@ -227,7 +227,7 @@ fn the_crazyflie_controller_corrects_setpoints_and_converts_degrees_and_pitch() 
 
     // The same line through an adapter in Rust.
     let model = Model::from_bytes(&file).unwrap();
-    let mut adapter = Adapter::<DESIRED, MEASURED, REFERENCE>::new(&model, &quadrotor::signals(), 100.0, PREVIEW).unwrap();
+    let mut adapter = Adapter::<DESIRED, MEASURED, REFERENCE>::new(&model, quadrotor::signals(), 100.0, PREVIEW).unwrap();
     adapter.defer();
     adapter.switch(Lanes::BOTH);
     let mut preview = Preview::<DESIRED, PREVIEW>::new(quadrotor::END_RULES, 0);

@@ -54,7 +54,7 @@ pub(crate) fn anything(_: &Model<'_>) -> Result<(), Refusal> {
 
 /// The flight stack, which is not for models of a cart.
 pub(crate) fn quadrotor(model: &Model<'_>) -> Result<(), Refusal> {
-    QuadrotorAdapter::new(model, &quadrotor::signals(), 100.0, PREVIEW).map(drop)
+    QuadrotorAdapter::new(model, quadrotor::signals(), 100.0, PREVIEW).map(drop)
 }
 
 /// The cart of all these models.

@@ -10,7 +10,7 @@ use crate::{
     FeatureSet, LinearMap, Module, Moment, Multisine, NetworkModule, Rows, Start, fixtures,
     levenberg_marquardt::{self, train},
     nonlinear::InputAffine,
-    samples::sample,
+    samples::{Reference, sample},
     simulate,
     simulation::rms,
 };
@@ -33,11 +33,11 @@ pub struct Trial {
 }
 
 /// Random references that excite the loop from slow to fast.
-pub(super) fn references(count: u64, amplitude: f64, offset: f64, seed: u64) -> Vec<(Box<dyn Fn(i64) -> f64 + Sync>, usize)> {
+pub(super) fn references(count: u64, amplitude: f64, offset: f64, seed: u64) -> Vec<(Reference, usize)> {
     (0..count)
         .map(|index| {
             let signal = Multisine::random(6, [0.05, 20.0], amplitude, offset, seed.wrapping_mul(1_000).wrapping_add(index));
-            let reference: Box<dyn Fn(i64) -> f64 + Sync> = Box::new(move |sample| signal.at(sample as f64 * PERIOD));
+            let reference: Reference = Box::new(move |sample| signal.at(sample as f64 * PERIOD));
             (reference, 1_200)
         })
         .collect()

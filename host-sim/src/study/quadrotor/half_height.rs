@@ -37,7 +37,7 @@ impl<'m> HalfHeight<'m> {
     pub fn new(settings: &Settings, command_delay: u32, model: Option<&'m Model<'m>>) -> Result<Option<Self>, Refusal> {
         let adapter = model
             .map(|model| {
-                let mut adapter = Adapter::new(model, &quadrotor::signals(), settings.rates.reference_hz(), PREVIEW)?;
+                let mut adapter = Adapter::new(model, quadrotor::signals(), settings.rates.reference_hz(), PREVIEW)?;
                 adapter.set_guard(GuardSettings::OFF);
                 adapter.switch(Lanes { network: true, feedback: false });
                 Ok(adapter)
