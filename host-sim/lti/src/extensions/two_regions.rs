@@ -148,3 +148,27 @@ pub fn run(settings: &levenberg_marquardt::Settings, others: u64, seed: u64) -> 
     };
     signals(others, seed).into_iter().enumerate().collect::<Vec<_>>().into_par_iter().map(fly).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::extensions::mean_and_worst;
+
+    #[test]
+    fn two_modules_serve_two_regions_better_than_one_and_the_selector_takes_the_bumps_away() {
+        let settings = levenberg_marquardt::Settings { units: 12, iterations: 60, ..Default::default() };
+        let trials = run(&settings, 2, 5);
+        let of = |scheme: usize| mean_and_worst(trials.iter().map(|trial| trial.error[scheme]));
+        let faded = of(5);
+        for single in 0..4 {
+            assert!(faded.0 < of(single).0, "{}: {trials:#?}", SCHEMES[single]);
+        }
+        // Along the border a fade costs less than hard switching, which chatters.
+        assert!(faded.1 < of(4).1, "{trials:#?}");
+        for trial in &trials {
+            // Without noise a module's own reference moves too.
+            assert!(trial.jump[5] < 0.5 * trial.jump[4], "{trial:#?}");
+            assert!(2 * trial.switches[1] < trial.switches[0], "{trial:#?}");
+        }
+    }
+}
