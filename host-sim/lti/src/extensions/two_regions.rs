@@ -160,8 +160,8 @@ mod tests {
         let trials = run(&settings, 2, 5);
         let of = |scheme: usize| mean_and_worst(trials.iter().map(|trial| trial.error[scheme]));
         let faded = of(5);
-        for single in 0..4 {
-            assert!(faded.0 < of(single).0, "{}: {trials:#?}", SCHEMES[single]);
+        for (single, name) in SCHEMES.iter().enumerate().take(4) {
+            assert!(faded.0 < of(single).0, "{name}: {trials:#?}");
         }
         // Along the border a fade costs less than hard switching, which chatters.
         assert!(faded.1 < of(4).1, "{trials:#?}");
