@@ -12,8 +12,8 @@ pub use study::render_study;
 use super::cases::{Case, Scene, flights_in_words, methods};
 use super::results::Results;
 use anyhow::Context as _;
-use maud::{DOCTYPE, PreEscaped, html};
-use std::fs;
+use impromptu_model_export::replacement::replace;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
 use std::path::Path;
 
 const STYLE: &str = include_str!("style.css");
@@ -28,40 +28,46 @@ pub fn render_html(results: &Results) -> anyhow::Result<String> {
     let scenes = Scene::group(&results.flights);
     let flights = flights_in_words(&cases, &results.per_flight);
     let charts = charts::sections(results, &cases, &methods, &scenes)?;
+    let body = html! {
+        header {
+            h1 { (results.title) }
+            p.lead {
+                "A learned add-on corrects the reference that a quadrotor\u{2019}s control loop is given; the loop itself stays as it is. "
+                "Every number here is simulated, in closed loop, on trajectories that the add-on was not trained on."
+            }
+            dl.facts {
+                @if let Some(flights) = &flights { div { dt { "Flights per cell" } dd { (flights) } } }
+                div { dt { "Seed" } dd { (results.seed) } }
+                div { dt { "Version" } dd { (results.software_version) } }
+            }
+        }
+        main {
+            (cards::headline(&cases))
+            (table::section(&cases, &methods, flights.as_deref()))
+            (charts)
+            (provenance::models(&results.models))
+            (words::definitions(results, &methods))
+            (provenance::run(results))
+        }
+    };
+    Ok(document(&results.title, &body))
+}
+
+/// A page of its own: nothing is loaded from elsewhere.
+fn document(title: &str, body: &Markup) -> String {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
             head {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
-                title { (results.title) }
+                title { (title) }
                 style { (PreEscaped(STYLE)) }
             }
-            body {
-                header {
-                    h1 { (results.title) }
-                    p.lead {
-                        "A learned add-on corrects the reference that a quadrotor\u{2019}s control loop is given; the loop itself stays as it is. "
-                        "Every number here is simulated, in closed loop, on trajectories that the add-on was not trained on."
-                    }
-                    dl.facts {
-                        @if let Some(flights) = &flights { div { dt { "Flights per cell" } dd { (flights) } } }
-                        div { dt { "Seed" } dd { (results.seed) } }
-                        div { dt { "Version" } dd { (results.software_version) } }
-                    }
-                }
-                main {
-                    (cards::headline(&cases))
-                    (table::section(&cases, &methods, flights.as_deref()))
-                    (charts)
-                    (provenance::models(&results.models))
-                    (words::definitions(results, &methods))
-                    (provenance::run(results))
-                }
-            }
+            body { (body) }
         }
     };
-    Ok(page.into_string())
+    page.into_string()
 }
 
 /// Writes the page to `path` at once: another file's content is replaced as a whole, or not at all.
@@ -77,16 +83,7 @@ pub fn write_html(results: &Results, path: &Path) -> anyhow::Result<()> {
 /// # Errors
 /// When the file cannot be written; the message names it.
 pub fn write_page(page: &str, path: &Path) -> anyhow::Result<()> {
-    let name = path.file_name().with_context(|| format!("'{}' does not name a file for the report", path.display()))?;
-    let mut partial = name.to_owned();
-    partial.push(format!(".{}.partial", std::process::id()));
-    let partial = path.with_file_name(partial);
-    let written = fs::write(&partial, page).and_then(|()| fs::rename(&partial, path));
-    if written.is_err() {
-        // Nothing may be left of a failed attempt; that it cannot be removed adds nothing to the first error.
-        let _ = fs::remove_file(&partial);
-    }
-    written.with_context(|| format!("the report cannot be written to '{}'", path.display()))
+    replace(path, page.as_bytes()).with_context(|| format!("the report cannot be written to '{}'", path.display()))
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! The page as a whole, on invented results.
 
+use std::fs;
+
 use super::*;
 use crate::report::fixture;
 
