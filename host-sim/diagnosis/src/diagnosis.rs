@@ -189,8 +189,7 @@ pub fn assess(record: &Record, settings: &Settings) -> Result<Assessment, Diagno
     let identified = identify(&record).ok_or(DiagnosisError::Unexplained { percent: 0.0 })?;
     let mut random = Xoshiro256PlusPlus::seed_from_u64(settings.seed);
     let draws = identified.draws(&record, settings.draws, &mut random);
-    let measured: Vec<&[f64]> = record.segments.iter().map(|segment| segment.measured.as_slice()).collect();
-    let mut properties = Properties::of(&identified, &draws, &measured, record.period_s);
+    let mut properties = Properties::of(&identified, &draws, &record);
     if properties.explained < LEAST_EXPLAINED {
         return Err(DiagnosisError::Unexplained { percent: 100.0 * properties.explained });
     }

@@ -15,6 +15,9 @@ pub struct Coverage {
     pub share: f64,
     /// Highest frequency with that coherence, Hz.
     pub highest_hz: f64,
+    /// Lowest frequency that the record shows, Hz: a twentieth of the reference's variance is at it and below. What happens at rest is
+    /// extrapolated from here.
+    pub lowest_hz: f64,
     /// Number of coefficients that the reference can tell apart, at most [`LAGS`]: two for each tone.
     pub order: usize,
 }
@@ -109,6 +112,40 @@ pub fn band(record: &Record) -> f64 {
     0.5 / record.period_s
 }
 
+/// Share of the reference's variance that lies at the lowest frequency and below.
+const SLOW_SHARE: f64 = 0.05;
+
+/// Lowest frequency that the reference shows, Hz (see [`Coverage::lowest_hz`]); 0 if stretches at different heights show the rest itself.
+pub fn lowest(record: &Record) -> f64 {
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let all: Vec<f64> = record.segments.iter().flat_map(|segment| segment.reference.iter().copied()).collect();
+    let middle = mean(&all);
+    let wanted = SLOW_SHARE * all.iter().map(|value| (value - middle).powi(2)).sum::<f64>();
+    let still = |segment: &Segment| segment.reference.len() as f64 * (mean(&segment.reference) - middle).powi(2);
+    let mut seen: f64 = record.segments.iter().map(still).sum();
+    // Line by line of the longest stretch, all stretches at the same frequencies: the low lines are few, so no fast transform.
+    let longest = record.segments.iter().map(|segment| segment.reference.len()).max().unwrap_or(0);
+    let mut line = 0;
+    while seen < wanted && 2 * line < longest {
+        line += 1;
+        seen += record.segments.iter().map(|segment| power(&segment.reference, line as f64 / longest as f64)).sum::<f64>();
+    }
+    line as f64 / (longest.max(1) as f64 * record.period_s)
+}
+
+/// Variance of a stretch that one line, in cycles a sample, holds, times the samples.
+fn power(values: &[f64], line: f64) -> f64 {
+    let middle = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let turn = Complex::from_polar(1.0, -std::f64::consts::TAU * line);
+    let mut phase = Complex::new(1.0f64, 0.0);
+    let mut sum = Complex::new(0.0, 0.0);
+    for value in values {
+        sum += phase * (value - middle);
+        phase *= turn;
+    }
+    2.0 * sum.norm_sqr() / values.len().max(1) as f64
+}
+
 /// What the record shows of a loop with that bandwidth, Hz; nothing above `trusted_hz` counts.
 pub fn coverage(record: &Record, bandwidth_hz: f64, trusted_hz: f64) -> Coverage {
     let spectra = Spectra::new(record, window(record));
@@ -118,6 +155,7 @@ pub fn coverage(record: &Record, bandwidth_hz: f64, trusted_hz: f64) -> Coverage
     Coverage {
         share: seen as f64 / inside as f64,
         highest_hz: (highest as f64 * spectra.spacing_hz).min(trusted_hz),
+        lowest_hz: lowest(record),
         order: order_of_excitation(record),
     }
 }
@@ -137,6 +175,16 @@ mod tests {
         assert_eq!(order_of_excitation(&record(|_| 0.7)), 0);
         assert_eq!(order_of_excitation(&record(|t| (2.0 * t).sin())), 2);
         assert_eq!(order_of_excitation(&record(|t| (2.0 * t).sin() + (5.0 * t).cos() + (9.0 * t).sin())), 6);
+    }
+
+    #[test]
+    fn the_lowest_frequency_is_that_of_the_slowest_tone_and_zero_between_heights() {
+        let tones = record(|t| (std::f64::consts::TAU * 0.2 * t).sin() + 3.0 * (std::f64::consts::TAU * t).sin());
+        assert!((0.17..=0.2).contains(&lowest(&tones)), "{}", lowest(&tones));
+        let steps = record(|t| (t / 8.0).floor() % 2.0);
+        assert!(lowest(&steps) < 0.1);
+        let heights = Record::joined([record(|t| t.sin()), record(|t| 2.0 + t.sin())]).unwrap();
+        assert_eq!(lowest(&heights), 0.0);
     }
 
     #[test]

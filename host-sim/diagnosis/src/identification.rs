@@ -22,7 +22,8 @@ use crate::{
 pub struct Identified {
     /// The model.
     pub model: TransferFunction,
-    /// Covariance of numerator, denominator without its first 1, whitened offset, in this order.
+    /// Covariance of numerator, denominator without its first 1, whitened offset, in this order; larger than white errors explain where
+    /// the model is not the whole truth.
     pub covariance: DMatrix<f64>,
     /// Weight of each dead time, in ticks, after the data; they sum to 1.
     pub dead_times: Vec<(usize, f64)>,
@@ -34,6 +35,8 @@ pub struct Identified {
 
 /// Highest order of the denominator.
 const HIGHEST_ORDER: usize = 4;
+/// Blocks from which the errors' spread is taken, at most: fewer and longer ones where the loop settles slowly.
+const MOST_BLOCKS: usize = 60;
 /// Longest dead time tried, ticks.
 const LONGEST_DEAD_TIME: usize = 12;
 
@@ -93,7 +96,7 @@ pub fn identify(record: &Record) -> Option<Identified> {
         noise: noise.collect(),
         dead_times: weights.into_iter().map(|(d, weight)| (d, weight / total)).filter(|(_, weight)| *weight > 1e-4).collect(),
         model,
-        covariance: chosen.covariance.clone(),
+        covariance: whitened.robust(&chosen.model, &chosen.covariance),
         whitening_order: arx.order,
     })
 }
@@ -271,10 +274,16 @@ impl Whitened {
 
     /// The output error linearised in the coefficients.
     fn linearised(&self, model: &TransferFunction) -> Regression {
+        let mut regression = Regression::new(coefficients(model).len());
+        self.gradients(model, |_, row, error| regression.push(row, error));
+        regression
+    }
+
+    /// Row by row: the index of its segment and its own, what each coefficient does to the output, the output error.
+    fn gradients(&self, model: &TransferFunction, mut of_row: impl FnMut([usize; 2], &[f64], f64)) {
         let (terms, order) = (model.numerator.len(), model.denominator.len() - 1);
-        let mut regression = Regression::new(terms + order + 1);
         let mut row = vec![0.0; terms + order + 1];
-        for segment in &self.segments {
+        for (index, segment) in self.segments.iter().enumerate() {
             let input = delayed(&segment.reference, model.dead_time);
             let simulated = filter(&model.numerator, &model.denominator, &input);
             let by_numerator = filter(&[1.0], &model.denominator, &input);
@@ -287,9 +296,39 @@ impl Whitened {
                     *cell = -by_denominator[tick - 1 - lag];
                 }
                 row[terms + order] = self.level;
-                regression.push(&row, segment.measured[tick] - simulated[tick] - model.offset * self.level);
+                of_row([index, tick], &row, segment.measured[tick] - simulated[tick] - model.offset * self.level);
             }
         }
-        regression
+    }
+
+    /// Covariance of coefficients of a model that is not the whole truth: from the spread of the blocks' pulls on the coefficients
+    /// (Liang and Zeger, "Longitudinal data analysis using generalized linear models", Biometrika 73 (1986), blocks for subjects), where
+    /// that is more than white errors explain.
+    fn robust(&self, model: &TransferFunction, white: &DMatrix<f64>) -> DMatrix<f64> {
+        let length = (2 * model.settling()).max(self.rows / MOST_BLOCKS).max(1);
+        let size = white.nrows();
+        let mut blocks: Vec<([usize; 2], DVector<f64>)> = Vec::new();
+        self.gradients(model, |[segment, tick], row, error| {
+            let block = [segment, tick / length];
+            if blocks.last().is_none_or(|(last, _)| *last != block) {
+                blocks.push((block, DVector::zeros(size)));
+            }
+            let (_, pull) = blocks.last_mut().expect("a block was just pushed");
+            pull.iter_mut().zip(row).for_each(|(sum, gradient)| *sum += gradient * error);
+        });
+        let (rows, size) = (self.rows as f64, size as f64);
+        let Some(root) = white.clone().cholesky().map(|cholesky| cholesky.l()) else { return white.clone() };
+        let variance = self.cost(model) / (rows - size);
+        // In coordinates in which white errors make the sum of squares of the pulls the unit matrix.
+        let mut squares = DMatrix::zeros(white.nrows(), white.nrows());
+        for (_, pull) in &blocks {
+            let pull = root.tr_mul(pull) / variance;
+            squares.ger(1.0, &pull, &pull, 1.0);
+        }
+        // White errors seen in so few blocks reach to the edge of Marchenko and Pastur's law.
+        let edge = (1.0 + (size / blocks.len().max(1) as f64).sqrt()).powi(2);
+        let mut eigen = squares.symmetric_eigen();
+        eigen.eigenvalues.iter_mut().for_each(|value| *value = if *value > edge { *value } else { 1.0 });
+        &root * eigen.recompose() * root.transpose()
     }
 }

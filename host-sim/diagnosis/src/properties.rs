@@ -5,7 +5,7 @@
 
 use serde::Serialize;
 
-use crate::{identification::Identified, transfer_function::TransferFunction};
+use crate::{excitation::lowest, identification::Identified, record::Record, transfer_function::TransferFunction};
 
 /// A value with the interval that holds it with 95 % of the draws' weight.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -81,7 +81,8 @@ pub struct Properties {
     pub strict_degree: RelativeDegree,
     /// Practical: the first tick at which the step response is above [`THRESHOLD`] of its end.
     pub practical_degree: RelativeDegree,
-    /// Steady-state gain.
+    /// Steady-state gain. The interval is wider by as much as the model's gain changes between the lowest frequency that the record
+    /// shows and rest: there a linear model of a loop that is not quite linear is extrapolated.
     pub gain: Interval,
     /// Output at zero input, in the output's unit.
     pub offset: Interval,
@@ -111,8 +112,9 @@ const LEAST_REVERSAL: f64 = 0.02;
 const HORIZON: usize = 400;
 
 impl Properties {
-    /// Properties of a model; `draws` are other models that could be the true one.
-    pub fn of(identified: &Identified, draws: &[TransferFunction], measured: &[&[f64]], period_s: f64) -> Self {
+    /// Properties of a model that was identified from the record; `draws` are other models that could be the true one.
+    pub fn of(identified: &Identified, draws: &[TransferFunction], record: &Record) -> Self {
+        let period_s = record.period_s;
         let model = &identified.model;
         let over = |property: &dyn Fn(&TransferFunction) -> f64| Interval::of(property(model), draws.iter().map(property));
         let degree = |property: &dyn Fn(&TransferFunction) -> usize| {
@@ -120,12 +122,12 @@ impl Properties {
             RelativeDegree { low: found.low as usize, value: found.value as usize, high: found.high as usize }
         };
         let horizon = (model.settling() + 20).min(HORIZON);
-        let (noise, explained) = fit(identified, measured);
+        let (noise, explained) = fit(identified, record);
         let reversals = |model: &TransferFunction| reversal(model, horizon).0;
         Self {
             strict_degree: strict(identified),
             practical_degree: degree(&|model| model.first_above(THRESHOLD, horizon)),
-            gain: over(&TransferFunction::gain),
+            gain: extrapolated(model, over(&TransferFunction::gain), lowest(record) * std::f64::consts::TAU * period_s),
             offset: over(&|model| model.offset),
             reversal: over(&reversals),
             reversal_ticks: reversal(model, horizon).1,
@@ -137,6 +139,11 @@ impl Properties {
             explained,
         }
     }
+}
+
+fn extrapolated(model: &TransferFunction, gain: Interval, angle: f64) -> Interval {
+    let change = (model.response(angle).norm() - gain.value.abs()).abs();
+    Interval { low: gain.low - change, value: gain.value, high: gain.high + change }
 }
 
 /// Dead times with 95 % of the weight, round the best.
@@ -201,13 +208,13 @@ fn zeros(model: &TransferFunction, draws: &[TransferFunction], period_s: f64) ->
         .collect()
 }
 
-fn fit(identified: &Identified, measured: &[&[f64]]) -> (f64, f64) {
+fn fit(identified: &Identified, record: &Record) -> (f64, f64) {
     let variance = |values: &mut dyn Iterator<Item = f64>| {
         let values: Vec<f64> = values.collect();
         let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
         values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len().max(1) as f64
     };
     let noise = variance(&mut identified.noise.iter().flatten().copied());
-    let total = variance(&mut measured.iter().flat_map(|segment| segment.iter()).copied());
+    let total = variance(&mut record.segments.iter().flat_map(|segment| &segment.measured).copied());
     (noise.sqrt(), if total > 0.0 { (1.0 - noise / total).max(0.0) } else { 0.0 })
 }

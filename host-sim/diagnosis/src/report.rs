@@ -121,7 +121,10 @@ impl Diagnosis {
                 100.0 * THRESHOLD
             ),
         ));
-        lines.push(line("steady-state gain", interval(properties.gain, 3)));
+        lines.push(line(
+            "steady-state gain",
+            format!("{}, from {:.2} Hz and above", interval(properties.gain, 3), self.coverage.lowest_hz),
+        ));
         lines.push(line("output at zero", format!("{} {unit}", interval(properties.offset, 4))));
         lines.push(line("initial reversal", self.reversal_text()));
         let inside = |re: f64, im: f64| judged_zeros(properties, &self.coverage).any(|zero| (zero.re, zero.im) == (re, im));
