@@ -5,9 +5,11 @@
 //! inputs that are all zero. In training y(t) stands where y_d(t) stands in flight, so x₁ - y_d is always zero there and is not learned.
 
 use anyhow::Result;
+use impromptu_firmware::features::Source;
 use impromptu_lti::{
-    FeatureSet, Learned, Start, fixtures::position_and_difference, learn, learning::Settings, levenberg_marquardt, simulate,
+    FeatureSet, Learned, Plant, Start, fixtures::position_and_difference, learn, learning::Settings, levenberg_marquardt, simulate,
 };
+use nalgebra::DMatrix;
 
 use super::desired;
 use crate::{
@@ -58,8 +60,9 @@ pub(super) fn add(study: &mut Study, settings: &Settings) -> Result<()> {
         SECTION,
         "Without steady-state error the network would have to add K / K0 - K, another number for each K, to the same inputs: only K0 = 1 lets it. \
          The steady state is K0 (K + b) with the one b that training left. The state does not help: in training y_d(t) is y(t), so that x1 - y_d is \
-         always zero there. With state features and K0 other than 1 the loop does not even come to rest: what the network made of a one-to-many \
-         target destabilises it, and the numbers found are those of the last sample.",
+         always zero there. With state features and K0 other than 1 the loop does not even come to rest, and the numbers found are those of the last \
+         sample: on sines the acceleration tells where one is (p = -a / omega^2), the network reads K / K0 - K from it with a very large gain on the \
+         second difference, and this feedback moves a pole of the loop out of the unit circle, as the largest poles below say.",
     );
     Ok(())
 }
@@ -67,6 +70,32 @@ pub(super) fn add(study: &mut Study, settings: &Settings) -> Result<()> {
 /// K₀ (K + b).
 fn predicted(learned: &Learned, gain: f64, step: f64) -> f64 {
     gain * (step + learned.network().evaluate(&vec![0.0; learned.set.features.len()]))
+}
+
+/// Magnitude of the largest pole of the loop with the network in front, linearised where the inputs are zero.
+fn largest_pole(learned: &Learned, gain: f64) -> f64 {
+    let system = position_and_difference(gain);
+    let order = Plant::<f64>::order(&system);
+    let step = 1e-6;
+    let slope = |feature: usize| {
+        let at = |value: f64| {
+            let mut inputs = vec![0.0; learned.set.features.len()];
+            inputs[feature] = value;
+            learned.network().evaluate(&inputs)
+        };
+        (at(step) - at(-step)) / (2.0 * step)
+    };
+    let mut feedback = vec![0.0; order];
+    for (index, feature) in learned.set.features.iter().enumerate().filter(|(_, feature)| feature.source == Source::Measured) {
+        feedback[usize::from(feature.channel)] += slope(index);
+    }
+    let mut matrix = DMatrix::zeros(order, order);
+    for (state, mut column) in matrix.column_iter_mut().enumerate() {
+        let mut next: Vec<f64> = (0..order).map(|index| if index == state { 1.0 } else { 0.0 }).collect();
+        system.advance(&mut next, feedback[state]);
+        column.copy_from_slice(&next);
+    }
+    matrix.complex_eigenvalues().iter().map(|pole| pole.norm()).fold(0.0, f64::max)
 }
 
 /// Steady states at several K.
@@ -91,8 +120,11 @@ fn steps(study: &mut Study, learned: &Learned, gain: f64, key: &str, what: &str)
     let apart = states.iter().map(|(_, found, predicted)| (found - predicted).abs()).fold(0.0, f64::max);
     let text = format!("{title}: largest difference of steady state and K0 (K + b) over nine K");
     let apart = Finding::new(SECTION, &format!("{key}_lemma_error"), &[16], &text, apart, "");
+    let pole = largest_pole(learned, gain);
+    let text = format!("{title}: largest pole of the loop with the network, linearised at rest");
+    study.find(Finding::new(SECTION, &format!("{key}_pole"), &[16], &text, pole, ""));
     // A loop that does not come to rest has no steady state to be asked for.
-    let rests = gain == 1.0 || key.ends_with("desired_only");
+    let rests = pole < 1.0;
     study.find(if rests { apart.asked(Asked::AtMost(1e-6)) } else { apart });
     let worst = states.iter().map(|(step, found, _)| (found - step).abs()).fold(0.0, f64::max);
     let text = format!("{title}: largest steady-state error over nine K");

@@ -37,6 +37,11 @@ fn the_papers_rows_on_linear_systems_come_out_as_it_states_them() {
     for name in ["unit_gain_state_space", "unit_gain_desired_only", "gain_0_7_desired_only", "gain_1_5_desired_only"] {
         assert!(value(&format!("{name}_lemma_error")) < 1e-6);
     }
+    // It needs a loop that comes to rest, which the network's feedback decides.
+    for name in ["unit_gain_state_space", "unit_gain_desired_only", "gain_0_7_desired_only", "gain_1_5_desired_only"] {
+        assert!(value(&format!("{name}_pole")) < 1.0);
+    }
+    assert!(value("gain_0_7_state_space_pole") > 1.0 && value("gain_1_5_state_space_pole") > 1.0);
     for set in ["state_space", "desired_only"] {
         assert!(value(&format!("unit_gain_{set}_largest_error")) < 1e-3);
         assert!(value(&format!("gain_0_7_{set}_largest_error")) > 1.0 && value(&format!("gain_1_5_{set}_largest_error")) > 1.5);
