@@ -96,18 +96,23 @@ pub fn predict(
     let (baseline, error) = middle(&outcomes)?;
     let reduction = |(baseline, error): &(f64, f64)| 100.0 * (1.0 - error / baseline);
     let found = Interval::of(reduction(&(baseline, error)), outcomes.iter().map(reduction));
+    let floor = root_mean_square(identified.noise.iter().flatten().copied());
+    // What the model does not explain need not come from outside: so far as it is the loop's own answer to its references (limits, other
+    // axes), the add-on's references bring it a second time.
+    let twice = |error: f64| error.hypot(floor);
     let wider = |end: f64| end + (end - found.value) * WIDENING + (end - found.value).signum() * LEAST_WIDENING;
+    let with_add_on = Interval::of(error, outcomes.iter().map(|outcome| outcome.1));
     Some(Prediction {
         window,
         features,
         baseline: Interval::of(baseline, outcomes.iter().map(|outcome| outcome.0)),
-        with_add_on: Interval::of(error, outcomes.iter().map(|outcome| outcome.1)),
+        with_add_on: Interval { high: twice(with_add_on.high), ..with_add_on },
         reduction_percent: Interval {
-            low: wider(found.low).min(found.value - LEAST_WIDENING),
+            low: 100.0 * (1.0 - twice((1.0 - wider(found.low).min(found.value - LEAST_WIDENING) / 100.0) * baseline) / baseline),
             value: found.value,
             high: wider(found.high).max(found.value + LEAST_WIDENING).min(100.0),
         },
-        floor: root_mean_square(identified.noise.iter().flatten().copied()),
+        floor,
     })
 }
 

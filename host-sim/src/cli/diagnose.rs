@@ -1,5 +1,8 @@
 //! `host-sim diagnose`: whether an add-on will help a loop, and by how much.
 
+#[cfg(test)]
+mod tests;
+
 use std::path::PathBuf;
 
 use anyhow::{Context as _, Result, bail};
@@ -15,7 +18,7 @@ use super::{
 };
 use crate::{
     channel::{AXES, Channel, of_logs, read},
-    experiment::{Excitation, Loop, Purpose, Recipe, demo::Observer as _},
+    experiment::{Excitation, Loop, Purpose, Recipe, demo::Observer as _, largest_sound_error},
     flight_log::FlightLog,
     rollout::FlightPlan,
     trajectory::{Sample, Trajectory},
@@ -133,7 +136,7 @@ impl Diagnose {
                 };
                 (source, AXES.iter().enumerate().map(axis).collect::<Result<Vec<_>, DiagnosisError>>()?)
             }
-            None => (format!("{} log(s)", self.log.len()), self.channels()?),
+            None => (format!("{} log(s)", self.log.len()), self.channels(session)?),
         };
         let wanted = |channel: &Channel| self.axis.is_empty() || self.axis.contains(&channel.name);
         let mut diagnosed = Diagnosed { seed, source, channels: Vec::new(), refused: Vec::new() };
@@ -153,16 +156,31 @@ impl Diagnose {
         session.format.print(&diagnosed, || text(&diagnosed))
     }
 
-    /// Channels of the logs, those of one name joined.
-    fn channels(&self) -> Result<Vec<Channel>> {
+    /// Channels of the logs, those of one name joined. Flights in which the loop broke down are left out, as `train` does; of other loops
+    /// nobody knows the scale of their errors, so that such a log is only named.
+    fn channels(&self, session: &Session) -> Result<Vec<Channel>> {
         let age_s = self.delay_ms.unwrap_or(0.0) / 1e3;
+        let columns = self.columns.as_ref().map(|columns| &columns.0);
+        let of_file = |path: &PathBuf| Ok((path.display().to_string(), read(path, columns, age_s).context("--log")?));
+        let files = self.log.iter().map(of_file).collect::<Result<Vec<_>>>()?;
+        let errors: Vec<f64> = files.iter().map(|(_, channels)| largest_error(channels)).collect();
+        let bound = largest_sound_error(&errors);
         let mut joined: Vec<Channel> = Vec::new();
-        for path in &self.log {
-            for channel in read(path, self.columns.as_ref().map(|columns| &columns.0), age_s).context("--log")? {
+        for ((path, channels), error) in files.into_iter().zip(errors) {
+            let flight = channels.iter().all(|channel| AXES.contains(&channel.name.as_str()));
+            if error > bound {
+                let away = format!("{path}: up to {error:.3} from the reference, beside {bound:.3} in a usual log at most");
+                if flight {
+                    session.console.note(&format!("{away}: the loop broke down; left out"));
+                    continue;
+                }
+                session.console.note(&format!("warning: {away}; if the loop broke down there, leave the log out"));
+            }
+            for channel in channels {
                 match joined.iter_mut().find(|known| known.name == channel.name) {
                     Some(known) => {
                         let record = Record::joined([known.record.clone(), channel.record]);
-                        known.record = record.with_context(|| format!("--log {}", path.display()))?;
+                        known.record = record.with_context(|| format!("--log {path}"))?;
                     }
                     None => joined.push(channel),
                 }
@@ -170,6 +188,17 @@ impl Diagnose {
         }
         Ok(joined)
     }
+}
+
+/// Largest distance between measured value and reference over a log, all its channels together.
+fn largest_error(channels: &[Channel]) -> f64 {
+    let mut squares: Vec<f64> = Vec::new();
+    for segment in channels.iter().flat_map(|channel| &channel.record.segments) {
+        squares.resize(squares.len().max(segment.measured.len()), 0.0);
+        let errors = segment.measured.iter().zip(&segment.reference).map(|(measured, reference)| measured - reference);
+        squares.iter_mut().zip(errors).for_each(|(square, error)| *square += error * error);
+    }
+    squares.into_iter().fold(0.0, f64::max).sqrt()
 }
 
 impl Test {

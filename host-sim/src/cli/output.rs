@@ -42,17 +42,26 @@ pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<()> {
 
 /// A table of text; all columns but the first `left` ones are set right, as numbers are.
 pub(super) fn table<const N: usize>(header: [&str; N], left: usize, rows: impl IntoIterator<Item = [String; N]>) -> String {
-    let cells = |texts: [String; N]| {
+    table_of(header.map(str::to_owned), left, rows)
+}
+
+/// The same with as many columns as the header has.
+pub(super) fn table_of<R: IntoIterator<Item = String>>(
+    header: impl IntoIterator<Item = String>,
+    left: usize,
+    rows: impl IntoIterator<Item = R>,
+) -> String {
+    fn cells(texts: impl IntoIterator<Item = String>, left: usize) -> impl Iterator<Item = Cell> {
         texts.into_iter().enumerate().map(move |(column, text)| {
             let alignment = if column < left { CellAlignment::Left } else { CellAlignment::Right };
             Cell::new(text).set_alignment(alignment)
         })
-    };
+    }
     let mut table = Table::new();
     // Lines of text are close enough to be read without rules between them.
-    table.load_style(presets::UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none())).set_header(cells(header.map(str::to_owned)));
+    table.load_style(presets::UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none())).set_header(cells(header, left));
     for row in rows {
-        table.add_row(cells(row));
+        table.add_row(cells(row, left));
     }
     table.trim_fmt() + "\n"
 }

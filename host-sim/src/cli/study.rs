@@ -5,11 +5,15 @@ mod robustness;
 use anyhow::Result;
 use clap::{Args, Subcommand};
 
-use super::{Session, output::table};
+use super::{
+    Session,
+    output::{table, table_of},
+};
 use crate::{
     report::{render_study, write_page},
     study::{
-        self,
+        self, Finding,
+        grid::grids,
         quadrotor::{self, QuadrotorSettings},
     },
 };
@@ -87,17 +91,42 @@ fn show(session: &Session, name: &str, study: &study::Study) -> Result<()> {
     let path = session.configuration.folder()?.join(format!("study-{name}.html"));
     write_page(&render_study(study)?, &path)?;
     session.console.note(&format!("report: {}", path.display()));
-    session.format.print(study, || {
-        let rows = study.findings.iter().map(|finding| {
-            [
-                finding.rows_text(),
-                finding.name.clone(),
-                finding.what.clone(),
-                finding.text(),
-                finding.paper_text(),
-                finding.asked_text(),
-            ]
-        });
-        table(["row", "name", "what", "found", "paper", "asked"], 3, rows)
-    })
+    session.format.print(study, || text(study))
+}
+
+/// Section by section: its tables, then what stands in none.
+fn text(study: &study::Study) -> String {
+    let mut text = format!("{}; seed {}; names of all numbers: --format json\n", study.title, study.seed);
+    for section in study.sections() {
+        text += &format!("\n{section}\n");
+        let (grids, others) = grids(study.of_section(section));
+        for grid in grids {
+            text += &format!("\n{}\n", grid.title);
+            let header = std::iter::once("").chain(grid.columns.iter().copied()).map(str::to_owned);
+            let rows = grid.rows.iter().map(|(title, cells)| {
+                let cells = cells.iter().map(|cell| cell.map_or_else(String::new, in_cell));
+                std::iter::once((*title).to_owned()).chain(cells).collect::<Vec<_>>()
+            });
+            text += &table_of(header, 1, rows);
+        }
+        if !others.is_empty() {
+            let rows = others.into_iter().map(|finding| {
+                [finding.rows_text(), finding.what.clone(), finding.text(), finding.paper_text(), finding.asked_text()]
+            });
+            text += &table(["row", "what", "found", "paper", "asked"], 2, rows);
+        }
+    }
+    text
+}
+
+/// A number with what stands beside it.
+fn in_cell(finding: &Finding) -> String {
+    let mut text = finding.text();
+    if finding.paper.is_some() {
+        text += &format!("\npaper {}", finding.paper_text());
+    }
+    if let Some(meets) = finding.meets() {
+        text += &format!("\n{} {}", if meets { "kept:" } else { "MISSED:" }, finding.asked_text());
+    }
+    text
 }

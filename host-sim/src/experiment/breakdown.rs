@@ -20,10 +20,7 @@ pub struct Breakdown {
 /// Splits logs into sound ones and those in which the loop broke down.
 pub(super) fn sound(logs: &[FlightLog]) -> (Vec<&FlightLog>, Vec<Breakdown>) {
     let errors: Vec<f64> = logs.iter().map(largest_error).collect();
-    let mut sorted = errors.clone();
-    sorted.sort_by(f64::total_cmp);
-    // The upper of the two middle ones: half of the logs at least are kept.
-    let bound = sorted.get(sorted.len() / 2).map_or(0.0, |median| FACTOR * median);
+    let bound = largest_sound_error(&errors);
     let (mut kept, mut broken) = (Vec::new(), Vec::new());
     for (log, largest_error) in logs.iter().zip(errors) {
         if largest_error <= bound {
@@ -33,6 +30,14 @@ pub(super) fn sound(logs: &[FlightLog]) -> (Vec<&FlightLog>, Vec<Breakdown>) {
         }
     }
     (kept, broken)
+}
+
+/// Largest tracking error at which a log is sound, from those of all logs.
+pub fn largest_sound_error(errors: &[f64]) -> f64 {
+    let mut sorted = errors.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    // The upper of the two middle ones: half of the logs at least are kept.
+    sorted.get(sorted.len() / 2).map_or(0.0, |median| FACTOR * median)
 }
 
 fn largest_error(log: &FlightLog) -> f64 {

@@ -16,7 +16,7 @@ mod models;
 mod monitor;
 mod recipe;
 
-pub use breakdown::Breakdown;
+pub use breakdown::{Breakdown, largest_sound_error};
 pub use build::{BuildError, Built, Purpose, best_in_flight, build, derived, smoothing, training_logs, validation_strokes};
 pub use evaluation::{EvaluationError, evaluate, model_card, per_flight, traces};
 pub use files::write_model_files;

@@ -4,6 +4,7 @@
 //! the JSON document lacks; *source* Zhou 2017 and the rows of its promises (1 to 31).
 
 pub mod extensions;
+pub mod grid;
 pub mod lti;
 pub mod quadrotor;
 pub mod robustness;
@@ -20,6 +21,17 @@ pub enum Asked {
     AtLeast(f64),
     /// At most so much.
     AtMost(f64),
+}
+
+/// Where a number stands in a table of its section.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Cell {
+    /// Title of the table.
+    pub table: String,
+    /// Title of the row.
+    pub row: String,
+    /// Title of the column.
+    pub column: String,
 }
 
 /// A number that was found.
@@ -45,6 +57,9 @@ pub struct Finding {
     /// What it should keep.
     #[serde(default)]
     pub asked: Option<Asked>,
+    /// Its place in a table of the section.
+    #[serde(default)]
+    pub cell: Option<Cell>,
 }
 
 impl Finding {
@@ -59,7 +74,14 @@ impl Finding {
             unit: unit.into(),
             paper: None,
             asked: None,
+            cell: None,
         }
+    }
+
+    /// In a table of its section.
+    #[must_use]
+    pub fn cell(self, table: &str, row: &str, column: &str) -> Self {
+        Self { cell: Some(Cell { table: table.into(), row: row.into(), column: column.into() }), ..self }
     }
 
     /// With what the paper states.
@@ -103,8 +125,13 @@ impl Finding {
 
     /// Rows of the paper, as `4, 7`.
     pub fn rows_text(&self) -> String {
-        self.rows.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+        listed(&self.rows)
     }
+}
+
+/// Numbers of rows, as `4, 7`.
+pub fn listed(rows: &[u8]) -> String {
+    rows.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 
 fn with_unit(value: f64, unit: &str) -> String {
@@ -112,6 +139,7 @@ fn with_unit(value: f64, unit: &str) -> String {
     let number = match magnitude {
         _ if !value.is_finite() => "n/a".to_owned(),
         _ if value == 0.0 || (1e-2..1e5).contains(&magnitude) && value.fract() == 0.0 => format!("{value:.0}"),
+        0.1..1e5 if unit == "%" => format!("{value:.1}"),
         1e-2..1e1 => format!("{value:.3}"),
         1e1..1e5 => format!("{value:.1}"),
         _ => format!("{value:.1e}"),
@@ -164,6 +192,11 @@ impl Study {
     /// Adds a paragraph to a section.
     pub fn note(&mut self, section: &str, text: &str) {
         self.notes.push(Note { section: section.into(), text: text.into() });
+    }
+
+    /// Numbers of a section.
+    pub fn of_section<'a>(&'a self, section: &'a str) -> impl Iterator<Item = &'a Finding> {
+        self.findings.iter().filter(move |finding| finding.section == section)
     }
 
     /// Sections in the order in which something was first said of them.

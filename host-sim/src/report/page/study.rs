@@ -1,11 +1,11 @@
 //! The page of a study: every row of the paper, its figure or number, and what differs.
 
-use maud::html;
+use maud::{Markup, html};
 
 use super::document;
 use crate::{
     report::plots::{colour_variable, draw},
-    study::Study,
+    study::{Finding, Study, grid::grids, listed},
 };
 
 /// The whole page as text.
@@ -30,21 +30,7 @@ pub fn render_study(study: &Study) -> anyhow::Result<String> {
                 section {
                     h2 { (section) }
                     @for note in study.notes.iter().filter(|note| note.section == section) { p { (note.text) } }
-                    @if study.findings.iter().any(|finding| finding.section == section) {
-                        div.scroll tabindex="0" { table.plain {
-                            thead { tr { th { "Row" } th { "What" } th.right { "Found" } th.right { "Paper" } th.right { "Asked" } } }
-                            tbody { @for finding in study.findings.iter().filter(|finding| finding.section == section) {
-                                tr {
-                                    td { (finding.rows_text()) }
-                                    td { (finding.what) " " code { (finding.name) } }
-                                    td.right { @if finding.meets() == Some(false) { span.worse { (finding.text()) } } @else { (finding.text()) } }
-                                    td.right { (finding.paper_text()) }
-                                    td.right { (finding.asked_text()) }
-                                }
-                            } }
-                        } }
-                    }
-                    div.panels { @for (figure, panel) in panels.iter().filter(|(figure, _)| figure.section == section) {
+                    div.panels.wide { @for (figure, panel) in panels.iter().filter(|(figure, _)| figure.section == section) {
                         figure {
                             figcaption { (figure.title) }
                             ul.legend { @for (index, curve) in figure.curves.iter().enumerate() {
@@ -53,9 +39,50 @@ pub fn render_study(study: &Study) -> anyhow::Result<String> {
                             (panel)
                         }
                     } }
+                    (numbers(study, section))
                 }
             }
         }
     };
     Ok(document(&study.title, &body))
+}
+
+/// Tables of a section, then what stands in none.
+fn numbers(study: &Study, section: &str) -> Markup {
+    let (grids, others) = grids(study.of_section(section));
+    html! {
+        @for grid in grids {
+            h3 { (grid.title) @if !grid.paper_rows.is_empty() { " (rows " (listed(&grid.paper_rows)) " of the paper)" } }
+            div.scroll tabindex="0" { table.numbers {
+                thead { tr { th {} @for column in &grid.columns { th { (column) } } } }
+                tbody { @for (title, cells) in &grid.rows { tr {
+                    th scope="row" { (title) }
+                    @for cell in cells { td { @if let Some(finding) = cell {
+                        span title=(finding.name) { (found(finding)) }
+                        @if finding.paper.is_some() { small { "paper " (finding.paper_text()) } }
+                        @if finding.asked.is_some() { small { "asked " (finding.asked_text()) } }
+                    } } }
+                } } }
+            } }
+        }
+        @if !others.is_empty() {
+            div.scroll tabindex="0" { table.plain {
+                thead { tr { th { "Row" } th { "What" } th.right { "Found" } th.right { "Paper" } th.right { "Asked" } } }
+                tbody { @for finding in others {
+                    tr {
+                        td { (finding.rows_text()) }
+                        td title=(finding.name) { (finding.what) }
+                        td.right { (found(finding)) }
+                        td.right { (finding.paper_text()) }
+                        td.right { (finding.asked_text()) }
+                    }
+                } }
+            } }
+        }
+    }
+}
+
+/// The number; marked if it misses what is asked.
+fn found(finding: &Finding) -> Markup {
+    html! { @if finding.meets() == Some(false) { span.worse { (finding.text()) } } @else { (finding.text()) } }
 }

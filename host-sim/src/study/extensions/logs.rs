@@ -76,8 +76,10 @@ pub(super) fn add(study: &mut Study, folder: Option<&Path>) -> Result<()> {
     study.find(Finding::new(SECTION, "logs_flights", &[], "flights predicted, each from other families", count, ""));
     let mut find = |name: &str, what: &str, of: &dyn Fn(&Prediction) -> f64| {
         let (mean, worst) = mean_and_worst(predictions.iter().map(|prediction| 100.0 * of(prediction)));
-        study.find(Finding::new(SECTION, &format!("logs_{name}"), &[], &format!("{what}, mean of the flights"), mean, "cm"));
-        study.find(Finding::new(SECTION, &format!("logs_{name}_worst"), &[], &format!("{what}, worst flight"), worst, "cm"));
+        for (suffix, of, value) in [("", "mean of the flights", mean), ("_worst", "worst flight", worst)] {
+            let found = Finding::new(SECTION, &format!("logs_{name}{suffix}"), &[], &format!("{what}, {of}"), value, "cm");
+            study.find(found.cell("RMS error", what, of));
+        }
     };
     find("measured", "error as flown", &|prediction| prediction.measured);
     find("repeated", "error of the model without add-on", &|prediction| prediction.repeated);

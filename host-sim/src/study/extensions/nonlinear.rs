@@ -8,6 +8,7 @@ use impromptu_lti::{
 use crate::study::{Asked, Finding, Study};
 
 const SECTION: &str = "A nonlinear plant with a known law";
+const TABLE: &str = "RMS over a trajectory";
 
 pub(super) fn add(study: &mut Study, settings: &Settings, others: u64, seed: u64) {
     let trials = input_affine::run(settings, others, seed);
@@ -19,8 +20,10 @@ pub(super) fn add(study: &mut Study, settings: &Settings, others: u64, seed: u64
     );
     let mut find = |name: &str, what: &str, errors: Vec<f64>| {
         let (mean, worst) = mean_and_worst(errors);
-        study.find(Finding::new(SECTION, &format!("nonlinear_{name}"), &[5], &format!("{what}, mean"), mean, ""));
-        study.find(Finding::new(SECTION, &format!("nonlinear_{name}_worst"), &[5], &format!("{what}, worst"), worst, ""));
+        for (suffix, of, value) in [("", "mean", mean), ("_worst", "worst", worst)] {
+            let found = Finding::new(SECTION, &format!("nonlinear_{name}{suffix}"), &[5], &format!("{what}, {of}"), value, "");
+            study.find(found.cell(TABLE, what, of));
+        }
     };
     find("model_rms", "u of the network less u of the exact law", trials.iter().map(|trial| trial.model).collect());
     find("tracking_network", "y - y_d, network", trials.iter().map(|trial| trial.network).collect());
@@ -36,6 +39,7 @@ pub(super) fn add(study: &mut Study, settings: &Settings, others: u64, seed: u64
             exact,
             "",
         )
+        .cell(TABLE, "y - y_d, exact law u = (y_d(t+r) - \u{125}(x))/D(x)", "worst")
         .asked(Asked::AtMost(1e-12)),
     );
 }

@@ -53,22 +53,11 @@ pub(super) fn add(study: &mut Study, each: u64, seed: u64) -> anyhow::Result<()>
             ("unprepared", &unprepared),
         ] {
             let (mean, worst) = mean_and_worst(of_kind(&signals, scheme, kind));
-            study.find(Finding::new(
-                SECTION,
-                &format!("{key}_{name}"),
-                &[31],
-                &format!("{kind}: {}, RMS, mean", scheme.name),
-                mean,
-                "",
-            ));
-            study.find(Finding::new(
-                SECTION,
-                &format!("{key}_{name}_worst"),
-                &[31],
-                &format!("{kind}: {}, RMS, worst", scheme.name),
-                worst,
-                "",
-            ));
+            for (suffix, of, value) in [("", "mean", mean), ("_worst", "worst", worst)] {
+                let text = format!("{kind}: {}, RMS, {of}", scheme.name);
+                let found = Finding::new(SECTION, &format!("{key}_{name}{suffix}"), &[31], &text, value, "");
+                study.find(found.cell(&format!("RMS of y - y_d, {of} signal of a kind"), kind, &scheme.name));
+            }
         }
     }
     let against = |scheme: &Scheme, baselines: &[&Scheme]| {
@@ -86,23 +75,13 @@ pub(super) fn add(study: &mut Study, each: u64, seed: u64) -> anyhow::Result<()>
         for (key, scheme) in [("learned", &learned), ("unprepared", &unprepared)] {
             let [mean, worst] = against(scheme, baselines);
             let what = format!("{}: reduction against {text}", scheme.name);
-            study.find(Finding::new(
-                SECTION,
-                &format!("preview_reduction_{key}_{name}"),
-                &[31],
-                &format!("{what}, mean"),
-                mean,
-                "%",
-            ));
-            let finding = Finding::new(
-                SECTION,
-                &format!("preview_reduction_{key}_{name}_worst"),
-                &[31],
-                &format!("{what}, worst signal"),
-                worst,
-                "%",
-            );
-            study.find(if key == "learned" { finding.asked(Asked::AtLeast(0.0)) } else { finding });
+            for (suffix, of, value) in [("", "mean", mean), ("_worst", "worst signal", worst)] {
+                let name = format!("preview_reduction_{key}_{name}{suffix}");
+                let found = Finding::new(SECTION, &name, &[31], &format!("{what}, {of}"), value, "%");
+                let found = found.cell("Reduction", &format!("against {text}, {of}"), &scheme.name);
+                let asked = key == "learned" && !suffix.is_empty();
+                study.find(if asked { found.asked(Asked::AtLeast(0.0)) } else { found });
+            }
         }
     }
     let largest = signals.iter().map(largest_value).fold(0.0, f64::max);
@@ -170,8 +149,10 @@ fn draw(
         let (mean, worst) = mean_and_worst((0..signals.len()).map(|index| 100.0 * learned.errors[index] / plain.errors[index]));
         let name = format!("preview_{}_s_remaining", seconds.to_string().replace('.', "_"));
         let what = format!("learned window, {seconds} s of preview: error left of y_d as reference");
-        study.find(Finding::new(SECTION, &name, &[31], &format!("{what}, mean"), mean, "%"));
-        study.find(Finding::new(SECTION, &format!("{name}_worst"), &[31], &format!("{what}, worst signal"), worst, "%"));
+        for (suffix, of, value) in [("", "mean", mean), ("_worst", "worst signal", worst)] {
+            let found = Finding::new(SECTION, &format!("{name}{suffix}"), &[31], &format!("{what}, {of}"), value, "%");
+            study.find(found.cell("Error left of y_d as reference", of, &format!("{seconds} s of preview")));
+        }
     }
     for (name, title, curves) in [
         ("preview_learned", "Learned window: what the preview buys", curves),

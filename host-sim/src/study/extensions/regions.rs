@@ -14,6 +14,7 @@ use crate::{
 };
 
 const SECTION: &str = "Two operating regions";
+const TABLE: &str = "Two modules and one";
 const KEYS: [&str; 6] = ["plain", "one_r1", "one_r2", "one_both", "two_hard", "two_faded"];
 
 pub(super) fn add(study: &mut Study, settings: &Settings, others: u64, seed: u64) {
@@ -23,7 +24,9 @@ pub(super) fn add(study: &mut Study, settings: &Settings, others: u64, seed: u64
         &format!(
             "Below y = 1 the relative degree is 1 and the DC gain 1, above it 2 and 1.6. The output is measured with noise of {NOISE}. One \
              module for all, with either preview or with both; two modules that switch at the border; two modules with the firmware's selector \
-             (hysteresis ±{HYSTERESIS}, change-over in {FADE} samples). 40 s across the border, along it within the noise, and random trajectories."
+             (hysteresis ±{HYSTERESIS}, change-over in {FADE} samples). 40 s across the border, along it within the noise, and random trajectories. \
+             Along the border the region changes all the time, whatever selects it: the reference that suits one side drives the output over \
+             to the other, by more than any hysteresis that is narrower than the gains are apart."
         ),
     );
     for (index, (key, scheme)) in KEYS.iter().zip(SCHEMES).enumerate() {
@@ -32,43 +35,22 @@ pub(super) fn add(study: &mut Study, settings: &Settings, others: u64, seed: u64
             ("largest jump of the reference in a sample", "jump", trials.iter().map(|trial| trial.jump[index]).collect()),
         ] {
             let (mean, worst) = mean_and_worst(values);
-            study.find(Finding::new(
-                SECTION,
-                &format!("regions_{name}_{key}"),
-                &[11],
-                &format!("{what}, {scheme}, mean"),
-                mean,
-                "",
-            ));
-            study.find(Finding::new(
-                SECTION,
-                &format!("regions_{name}_{key}_worst"),
-                &[11],
-                &format!("{what}, {scheme}, worst"),
-                worst,
-                "",
-            ));
+            for (suffix, of, value) in [("", "mean", mean), ("_worst", "worst", worst)] {
+                let text = format!("{what}, {scheme}, {of}");
+                let found = Finding::new(SECTION, &format!("regions_{name}_{key}{suffix}"), &[11], &text, value, "");
+                study.find(found.cell(TABLE, scheme, &format!("{what}, {of}")));
+            }
         }
     }
-    for (index, key) in ["hard", "faded"].iter().enumerate() {
+    for ((index, key), scheme) in ["hard", "faded"].iter().enumerate().zip(&SCHEMES[4..]) {
         let most = trials.iter().map(|trial| trial.switches[index]).max().unwrap_or(0);
         let along = trials.get(1).map_or(0, |trial| trial.switches[index]);
-        study.find(Finding::new(
-            SECTION,
-            &format!("regions_switches_{key}_worst"),
-            &[11],
-            "changes of region in 40 s, worst",
-            f64::from(most),
-            "",
-        ));
-        study.find(Finding::new(
-            SECTION,
-            &format!("regions_switches_{key}_along_border"),
-            &[11],
-            "changes of region in 40 s along the border",
-            f64::from(along),
-            "",
-        ));
+        for (suffix, of, value) in [("worst", "worst", most), ("along_border", "along the border", along)] {
+            let text = format!("changes of region in 40 s, {scheme}, {of}");
+            let name = format!("regions_switches_{key}_{suffix}");
+            let found = Finding::new(SECTION, &name, &[11], &text, f64::from(value), "");
+            study.find(found.cell(TABLE, scheme, &format!("changes of region in 40 s, {of}")));
+        }
     }
     let curve = |index: usize| {
         Curve::line_and_dots(

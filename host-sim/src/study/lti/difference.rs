@@ -7,7 +7,8 @@
 use anyhow::Result;
 use impromptu_firmware::features::Source;
 use impromptu_lti::{
-    FeatureSet, Learned, Plant, Start, fixtures::position_and_difference, learn, learning::Settings, levenberg_marquardt, simulate,
+    FeatureSet, Learned, Plant, Start, fixtures::position_and_difference, learn, learning::Settings, levenberg_marquardt,
+    simulate,
 };
 use nalgebra::DMatrix;
 
@@ -108,11 +109,13 @@ fn steps(study: &mut Study, learned: &Learned, gain: f64, key: &str, what: &str)
     };
     let states: Vec<(f64, f64, f64)> = STEPS.map(f64::from).map(|step| (step, rest(step), predicted(learned, gain, step))).into();
     let title = format!("DC gain {gain}, difference learning {what}");
+    let (table, row) = (format!("Steady state after a step to K, difference learning {what}"), format!("DC gain {gain}"));
     for (step, name) in NAMED {
         let Some((step, found, predicted)) = states.iter().find(|state| state.0 == f64::from(step)) else { continue };
         let mut number = |suffix: &str, text: &str, value: f64| {
             let text = format!("{title}: {text}, K = {step}");
-            study.find(Finding::new(SECTION, &format!("{key}_{name}_{suffix}"), &[14, 16], &text, value, ""));
+            let found = Finding::new(SECTION, &format!("{key}_{name}_{suffix}"), &[14, 16], &text, value, "");
+            study.find(found.cell(&table, &row, &format!("K = {step}, {suffix}")));
         };
         number("found", "steady state found", *found);
         number("predicted", "steady state K0 (K + b)", *predicted);
@@ -120,15 +123,18 @@ fn steps(study: &mut Study, learned: &Learned, gain: f64, key: &str, what: &str)
     let apart = states.iter().map(|(_, found, predicted)| (found - predicted).abs()).fold(0.0, f64::max);
     let text = format!("{title}: largest difference of steady state and K0 (K + b) over nine K");
     let apart = Finding::new(SECTION, &format!("{key}_lemma_error"), &[16], &text, apart, "");
+    let apart = apart.cell(&table, &row, "largest |y_ss - K0 (K + b)|");
     let pole = largest_pole(learned, gain);
     let text = format!("{title}: largest pole of the loop with the network, linearised at rest");
-    study.find(Finding::new(SECTION, &format!("{key}_pole"), &[16], &text, pole, ""));
+    let found = Finding::new(SECTION, &format!("{key}_pole"), &[16], &text, pole, "");
+    study.find(found.cell(&table, &row, "largest pole with the network"));
     // A loop that does not come to rest has no steady state to be asked for.
     let rests = pole < 1.0;
     study.find(if rests { apart.asked(Asked::AtMost(1e-6)) } else { apart });
     let worst = states.iter().map(|(step, found, _)| (found - step).abs()).fold(0.0, f64::max);
     let text = format!("{title}: largest steady-state error over nine K");
-    study.find(Finding::new(SECTION, &format!("{key}_largest_error"), &[16], &text, worst, ""));
+    let found = Finding::new(SECTION, &format!("{key}_largest_error"), &[16], &text, worst, "");
+    study.find(found.cell(&table, &row, "largest |y_ss - K|"));
     [
         Curve::dots(&format!("DC gain {gain}, found"), states.iter().map(|state| (state.0, state.1 - state.0))),
         Curve::line(&format!("DC gain {gain}, predicted"), states.iter().map(|state| (state.0, state.2 - state.0))),

@@ -49,7 +49,11 @@ fn finding(system: &System, name: &str, rows: &[u8], what: &str, value: f64, uni
 
 /// A number of one of the systems.
 pub(super) fn finding_in(section: &str, system: &System, name: &str, rows: &[u8], what: &str, value: f64, unit: &str) -> Finding {
-    Finding::new(section, &format!("{}_{name}", system.key), rows, &format!("{}: {what}", system.title), value, unit)
+    Finding::new(section, &format!("{}_{name}", system.key), rows, &format!("{}: {what}", system.title), value, unit).cell(
+        "The paper's systems",
+        what,
+        system.title,
+    )
 }
 
 fn properties(study: &mut Study, system: &System) {

@@ -40,23 +40,29 @@ pub(super) fn add(study: &mut Study, networks: &OfMinimumPhase) {
         let run: Run<f64> = simulate(&system, module, &super::desired, &start, SAMPLES);
         let errors = run.errors();
         let settled = settling(&errors[..DISTURBED.start as usize], 1e-3);
-        study.find(Finding::new(
-            SECTION,
-            &format!("{key}_settling"),
-            &[13],
-            &format!("{label}: samples until an initial error of 1 is below 1e-3"),
-            settled as f64,
-            "samples",
-        ));
+        study.find(
+            Finding::new(
+                SECTION,
+                &format!("{key}_settling"),
+                &[13],
+                &format!("{label}: samples until an initial error of 1 is below 1e-3"),
+                settled as f64,
+                "samples",
+            )
+            .cell("S1", label, "initial error of 1 below 1e-3 after"),
+        );
         let disturbed = errors[DISTURBED.end as usize - 1].abs();
-        study.find(Finding::new(
-            SECTION,
-            &format!("{key}_disturbed"),
-            &[13],
-            &format!("{label}: error under a constant disturbance of {DISTURBANCE} on the reference"),
-            disturbed,
-            "",
-        ));
+        study.find(
+            Finding::new(
+                SECTION,
+                &format!("{key}_disturbed"),
+                &[13],
+                &format!("{label}: error under a constant disturbance of {DISTURBANCE} on the reference"),
+                disturbed,
+                "",
+            )
+            .cell("S1", label, &format!("error under a disturbance of {DISTURBANCE}")),
+        );
         curves.push(panel::curve(label, errors.into_iter().map(|error| error.abs().max(1e-17))));
     }
     let title = "S1 with an initial error, and a disturbance between 5 and 10 s";

@@ -51,7 +51,9 @@ fn of_system(study: &mut Study, system: &System, settings: &Settings) -> Result<
     let baseline = |moment: &Moment<'_, f64>| moment.desired(0);
     let baseline = assess(model, &baseline, &law, &super::desired, &Start::rest(), samples());
     let rms = baseline.tracking_rms;
-    study.find(finding(system, "baseline_tracking_rms", &[19], "tracking RMS with the desired output as reference", rms, ""));
+    let what = "tracking RMS with the desired output as reference";
+    let found = finding(system, "baseline_tracking_rms", &[19], what, rms, "");
+    study.find(found.cell(system.title, "desired output as reference", "tracking, RMS"));
     draw(study, system, &flown, &baseline);
     let law = TransferFunctionLaw::new(&model.transfer_function());
     let transfer_function = learn(model, &FeatureSet::transfer_function(order, ahead), settings)?;
@@ -78,7 +80,9 @@ fn fly(
     let steps = learned.fit.progress.len().saturating_sub(1) as f64;
     let name = format!("{key}_iterations");
     let text = format!("steps of Levenberg-Marquardt, {what}");
-    study.find(finding(system, &name, &[18], &text, steps, "").asked(Asked::AtMost(1000.0)));
+    let row = |precision: &str| format!("{what}, {precision}");
+    let steps = finding(system, &name, &[18], &text, steps, "").asked(Asked::AtMost(1000.0));
+    study.find(steps.cell(system.title, &row("f64"), "Levenberg-Marquardt, steps"));
     let assessed = |module: &dyn Module<f64>| assess(&system.model, module, law, &super::desired, &Start::rest(), samples());
     let mut flown = vec![assessed(&learned.module())];
     for (_, precision) in KERNELS {
@@ -87,11 +91,12 @@ fn fly(
     }
     for (precision, assessment) in ["f64"].into_iter().chain(KERNELS.map(|kernel| kernel.0)).zip(&flown) {
         for (quantity, text, rows, value) in [
-            ("model_rms", "RMS of network less exact law", [7, 19], assessment.model_rms),
-            ("tracking_rms", "tracking RMS", [18, 19], assessment.tracking_rms),
+            ("model_rms", "network less exact law, RMS", [7, 19], assessment.model_rms),
+            ("tracking_rms", "tracking, RMS", [18, 19], assessment.tracking_rms),
         ] {
             let name = format!("{key}_{quantity}_{precision}");
             let found = finding(system, &name, &rows, &format!("{text}, {what}, {precision}"), value, "");
+            let found = found.cell(system.title, &row(precision), text);
             study.find(beside_the_paper(found, system, key, quantity, precision));
         }
     }

@@ -27,6 +27,7 @@ use crate::{
 };
 
 const SECTION: &str = "Fig. 4: a baseline with a DC gain of 0.5 in z";
+const TABLE: &str = "Half of the height: what is left of the error";
 /// Heights of the steps, m; within what the training flights reached. The first is the paper's unit step.
 const HEIGHTS: [f64; 4] = [1.0, 0.5, 0.75, 1.25];
 /// Time of a step, and until its end is judged, s.
@@ -121,17 +122,21 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> 
             &format!("{words}: height at which a unit step settles"),
             settled(&logs[0]),
             "m",
-        );
+        )
+        .cell(TABLE, words, "a unit step settles at");
         study.find(if name == "baseline" { finding.paper(f64::from(GAIN)) } else { finding });
         let worst = logs.iter().zip(HEIGHTS).map(|(log, height)| (settled(log) - height).abs()).fold(0.0, f64::max);
-        study.find(Finding::new(
-            SECTION,
-            &format!("fig_4_{name}_worst"),
-            &[16, 27],
-            &format!("{words}: largest steady error of steps to 0.5, 0.75, 1 and 1.25 m"),
-            100.0 * worst,
-            "cm",
-        ));
+        study.find(
+            Finding::new(
+                SECTION,
+                &format!("fig_4_{name}_worst"),
+                &[16, 27],
+                &format!("{words}: largest steady error of steps to 0.5, 0.75, 1 and 1.25 m"),
+                100.0 * worst,
+                "cm",
+            )
+            .cell(TABLE, words, "largest steady error, steps of 0.5 to 1.25 m"),
+        );
     }
     let z = |log: &FlightLog, desired: bool| -> Vec<(f64, f64)> {
         let point = |row: &crate::flight_log::LogRow| {

@@ -76,6 +76,7 @@ fn report(study: &mut Study, name: &str, what: &str, test: (f64, f64), validatio
     ] {
         // A flight that left the numbers is as bad as can be.
         let value = value.max(-1e6);
-        study.find(Finding::new(SECTION, &format!("{name}{key}"), &[14, 15], &format!("{what}; {of}"), value, "%"));
+        let found = Finding::new(SECTION, &format!("{name}{key}"), &[14, 15], &format!("{what}; {of}"), value, "%");
+        study.find(found.cell("Reduction by reference points", what, of));
     }
 }

@@ -71,14 +71,9 @@ fn sub_rates(crazyflie: &Crazyflie, study: &mut Study) -> anyhow::Result<()> {
     let rates: Vec<f64> = DIVISORS.iter().map(|divisor| 100.0 / f64::from(*divisor)).collect();
     for (way, kind) in [(0, "held"), (1, "interpolated")] {
         for (rate, found) in rates.iter().zip(&found) {
-            study.find(Finding::new(
-                SECTION,
-                &format!("rate_{rate:.0}_hz_{kind}"),
-                &[29],
-                &format!("Crazyflie, window network at {rate:.0} Hz, {kind}: mean reduction over strokes"),
-                found[way].0,
-                "%",
-            ));
+            let text = format!("Crazyflie, window network at {rate:.0} Hz, {kind}: mean reduction over strokes");
+            let found = Finding::new(SECTION, &format!("rate_{rate:.0}_hz_{kind}"), &[29], &text, found[way].0, "%");
+            study.find(found.cell("Crazyflie, clean: mean reduction by the rate of the network", kind, &format!("{rate:.0} Hz")));
         }
     }
     study.draw(Figure {
@@ -113,14 +108,9 @@ fn previews(crazyflie: &Crazyflie, study: &mut Study) -> anyhow::Result<()> {
         .collect::<anyhow::Result<_>>()?;
     for (way, kind) in [(0, "clean"), (1, "lab")] {
         for (preview, found) in PREVIEWS.iter().zip(&found) {
-            study.find(Finding::new(
-                SECTION,
-                &format!("preview_{:.0}_ms_{kind}", 1e3 * preview),
-                &[6],
-                &format!("Crazyflie, {kind}: ridge on the window, {preview} s of preview, mean reduction"),
-                found[way].0,
-                "%",
-            ));
+            let text = format!("Crazyflie, {kind}: ridge on the window, {preview} s of preview, mean reduction");
+            let found = Finding::new(SECTION, &format!("preview_{:.0}_ms_{kind}", 1e3 * preview), &[6], &text, found[way].0, "%");
+            study.find(found.cell("Crazyflie, ridge on the window: mean reduction by preview", kind, &format!("{preview} s")));
         }
     }
     study.draw(Figure {
@@ -159,16 +149,12 @@ fn steps_and_seconds(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<(
     let kinds = [(0, "steps", "r = 4, 4, 2 ticks"), (1, "seconds", "r = 0.6, 0.6, 0.3 s")];
     for (way, kind, words) in kinds {
         for (rate, found) in rates.iter().zip(&found) {
-            study.find(Finding::new(
-                SECTION,
-                &format!("predecessor_{rate:.0}_hz_{kind}"),
-                &[9, 23, 29],
-                &format!(
-                    "predecessor's loop, ridge on 12 inputs at {rate:.1} Hz, {words}: mean reduction over validation strokes"
-                ),
-                found[way],
-                "%",
-            ));
+            let text = format!(
+                "predecessor's loop, ridge on 12 inputs at {rate:.1} Hz, {words}: mean reduction over validation strokes"
+            );
+            let found = Finding::new(SECTION, &format!("predecessor_{rate:.0}_hz_{kind}"), &[9, 23, 29], &text, found[way], "%");
+            let table = "Predecessor's loop, ridge on 12 inputs: mean reduction by sub-rate and r";
+            study.find(found.cell(table, words, &format!("{rate:.1} Hz")));
         }
     }
     study.draw(Figure {
@@ -185,16 +171,13 @@ fn steps_and_seconds(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<(
     });
     let found: Vec<f64> = DEGREES.par_iter().map(|&r| fly(DIVISOR, [r, r, (r / 2).max(1)])).collect::<anyhow::Result<_>>()?;
     for (degree, found) in DEGREES.iter().zip(&found) {
-        study.find(Finding::new(
-            SECTION,
-            &format!("predecessor_degree_{degree}"),
-            &[9, 23],
-            &format!(
-                "predecessor's loop, ridge on 12 inputs at 6.67 Hz, r = {degree}, {degree}, {}: mean reduction",
-                (degree / 2).max(1)
-            ),
-            *found,
-            "%",
+        let degrees = format!("r = {degree}, {degree}, {}", (degree / 2).max(1));
+        let text = format!("predecessor's loop, ridge on 12 inputs at 6.67 Hz, {degrees}: mean reduction");
+        let found = Finding::new(SECTION, &format!("predecessor_degree_{degree}"), &[9, 23], &text, *found, "%");
+        study.find(found.cell(
+            "Predecessor's loop, ridge on 12 inputs at 6.67 Hz: mean reduction by r",
+            "mean reduction",
+            &degrees,
         ));
     }
     Ok(())

@@ -20,6 +20,8 @@ use crate::{
 };
 
 const SECTION: &str = "Training signals";
+const TABLE: &str = "Predecessor's loop: mean reduction over the five test trajectories";
+const CRAZYFLIE_TABLE: &str = "Crazyflie, lab: reduction over validation strokes";
 
 /// What came of a signal.
 struct Flown<const N: usize> {
@@ -75,23 +77,13 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> 
         ["network, inputs relative to y", "network, inputs relative to y_d", "ridge, relative to y", "ridge, relative to y_d"];
     for Flown { name, words: signal, determination, reductions } in &found {
         for ((kind, word), (mean, _)) in kinds.iter().zip(words).zip(reductions) {
-            study.find(Finding::new(
-                SECTION,
-                &format!("signal_{name}_{kind}"),
-                &[28],
-                &format!("{signal}: {word}, mean over the five test trajectories"),
-                mean.max(-1e6),
-                "%",
-            ));
+            let text = format!("{signal}: {word}, mean over the five test trajectories");
+            let found = Finding::new(SECTION, &format!("signal_{name}_{kind}"), &[28], &text, mean.max(-1e6), "%");
+            study.find(found.cell(TABLE, signal, word));
         }
-        study.find(Finding::new(
-            SECTION,
-            &format!("signal_{name}_rows"),
-            &[28],
-            &format!("{signal}: R² of the network on the flights kept from training"),
-            100.0 * determination,
-            "%",
-        ));
+        let text = format!("{signal}: R² of the network on the flights kept from training");
+        let found = Finding::new(SECTION, &format!("signal_{name}_rows"), &[28], &text, 100.0 * determination, "%");
+        study.find(found.cell(TABLE, signal, "R² on flights kept from training"));
     }
     study.draw(Figure {
         section: SECTION.into(),
@@ -144,14 +136,10 @@ pub(super) fn crazyflie(ground: &Ground<'_>, crazyflie: &Crazyflie, study: &mut 
             [("ridge", "ridge on the window"), ("network", "network beside it")].iter().zip(reductions)
         {
             for (key, what, value) in [("", "mean", mean), ("_worst", "worst", worst)] {
-                study.find(Finding::new(
-                    SECTION,
-                    &format!("crazyflie_signal_{name}_{kind}{key}"),
-                    &[28],
-                    &format!("Crazyflie, lab, {words}: {map}, {what} over the validation strokes"),
-                    value.max(-1e6),
-                    "%",
-                ));
+                let text = format!("Crazyflie, lab, {words}: {map}, {what} over the validation strokes");
+                let name = format!("crazyflie_signal_{name}_{kind}{key}");
+                let found = Finding::new(SECTION, &name, &[28], &text, value.max(-1e6), "%");
+                study.find(found.cell(CRAZYFLIE_TABLE, words, &format!("{map}, {what}")));
             }
         }
     }

@@ -74,7 +74,9 @@ pub(super) fn run(crazyflie: &Crazyflie, study: &mut Study) -> anyhow::Result<()
     for ((hidden, cost), found) in SIZES.iter().zip(&cost).zip(&found) {
         let name = words(hidden);
         let mut find = |key: &str, what: &str, value: f64, unit: &str| {
-            study.find(Finding::new(SECTION, &format!("size_{name}_{key}"), &[21, 30], &format!("{name}: {what}"), value, unit));
+            let text = format!("{name}: {what}");
+            let found = Finding::new(SECTION, &format!("size_{name}_{key}"), &[21, 30], &text, value, unit);
+            study.find(found.cell("Size of the network", &name, what));
         };
         find("cycles", "cycles of an evaluation, estimated", *cost, "");
         for ((key, case), (mean, worst)) in CASES.iter().zip(found) {

@@ -140,7 +140,11 @@ fn report(study: &mut Study, section: &str, prefix: &str, course: &Course, flown
         let cm = 100.0 * errors.iter().sum::<f64>() / errors.len().max(1) as f64;
         let key = |what: &str| format!("{prefix}_{name}_{what}");
         let finding = |what: &str, text: &str, value, unit| {
-            Finding::new(section, &key(what), &[28], &format!("{words}: {text}"), value, unit)
+            Finding::new(section, &key(what), &[28], &format!("{words}: {text}"), value, unit).cell(
+                "Over the strokes",
+                words,
+                text,
+            )
         };
         study.find(finding("error", "mean RMS error", cm, "cm"));
         if *name != "baseline" {

@@ -19,6 +19,7 @@ use crate::{
 };
 
 const SECTION: &str = "Table I and Fig. 3: 12 against 36 inputs";
+const TABLE: &str = "Table I: reduction of the RMS error";
 /// Reductions that the paper states, 12 and 36 inputs, per cent; its five trajectories are others.
 const PAPER: [[f64; 5]; 2] = [[52.4, 48.4, 42.0, 46.6, 36.9], [55.6, 61.4, 39.7, 43.9, 26.6]];
 const PAPER_MEAN: [f64; 2] = [45.2, 45.5];
@@ -76,6 +77,7 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<Netw
         lists.iter().zip(files).zip(determinations).zip(PAPER.iter().zip(PAPER_MEAN))
     {
         let (file, ridge) = (file?, ridge?);
+        let column = format!("{name} inputs");
         let errors = ground.test.errors(plant, &file, super::addon::NETWORK)?;
         let reductions = ground.test.reductions(&errors);
         for ((trajectory, reduction), paper) in TEST.iter().zip(&reductions).zip(paper) {
@@ -89,6 +91,7 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<Netw
                     *reduction,
                     "%",
                 )
+                .cell(TABLE, trajectory, &column)
                 .paper(*paper),
             );
         }
@@ -101,7 +104,8 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<Netw
             mean,
             "%",
         )
-        .paper(paper_mean);
+        .paper(paper_mean)
+        .cell(TABLE, "mean reduction over the five", &column);
         study.find(if *name == "12" { finding.asked(Asked::AtLeast(80.0)) } else { finding });
         let (validation, worst) = ground.validation.reduction(plant, &file)?;
         let (ridge, _) = ground.test.reduction(plant, &ridge)?;
@@ -111,28 +115,19 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<Netw
             ("ridge", "ridge regression on the same inputs, mean over the five", ridge),
             ("rows", "R² of the network on the flights kept from training", 100.0 * determination),
         ] {
-            study.find(Finding::new(
-                SECTION,
-                &format!("inputs_{name}_{key}"),
-                &[21],
-                &format!("{name} inputs: {what}"),
-                value,
-                "%",
-            ));
+            let text = format!("{column}: {what}");
+            let found = Finding::new(SECTION, &format!("inputs_{name}_{key}"), &[21], &text, value, "%");
+            study.find(found.cell(TABLE, what, &column));
         }
         let cm = 100.0 * errors.iter().sum::<f64>() / errors.len() as f64;
-        study.find(Finding::new(
-            SECTION,
-            &format!("inputs_{name}_error"),
-            &[25],
-            &format!("{name} inputs: mean RMS error"),
-            cm,
-            "cm",
-        ));
+        let text = format!("{column}: mean RMS error");
+        let found = Finding::new(SECTION, &format!("inputs_{name}_error"), &[25], &text, cm, "cm");
+        study.find(found.cell(TABLE, "mean RMS error", &column));
         logs.push(ground.test.logs(plant, Some(&file))?);
     }
     let cm = 100.0 * ground.test.baseline.iter().sum::<f64>() / 5.0;
-    study.find(Finding::new(SECTION, "baseline_error", &[20, 25], "baseline: mean RMS error", cm, "cm"));
+    let found = Finding::new(SECTION, "baseline_error", &[20, 25], "baseline: mean RMS error", cm, "cm");
+    study.find(found.cell(TABLE, "mean RMS error", "baseline"));
     delays(study, [("baseline", &baseline), ("12 inputs", &logs[0]), ("36 inputs", &logs[1])]);
     figures(study, [("baseline", &baseline[0]), ("12 inputs", &logs[0][0]), ("36 inputs", &logs[1][0])]);
     study.note(
@@ -154,14 +149,9 @@ fn delays(study: &mut Study, flights: [(&str, &Vec<FlightLog>); 3]) {
     for (name, logs) in flights {
         for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
             let Some(delay) = delay(logs, axis) else { continue };
-            study.find(Finding::new(
-                SECTION,
-                &format!("delay_{letter}_{}", name.replace(' ', "_")),
-                &[26],
-                &format!("{name}: delay of {letter} by cross-correlation"),
-                delay,
-                "s",
-            ));
+            let text = format!("{name}: delay of {letter} by cross-correlation");
+            let found = Finding::new(SECTION, &format!("delay_{letter}_{}", name.replace(' ', "_")), &[26], &text, delay, "s");
+            study.find(found.cell("Delay by cross-correlation", letter, name));
         }
     }
 }

@@ -90,8 +90,9 @@ pub(super) fn tell_cases(study: &mut Study, plant: &Loop, flown: &[(&'static str
             case => CASES.iter().find(|known| known.name == case).map_or(case, |known| known.what),
         };
         let mut find = |name: &str, what: &str, value: f64, unit: &str, bound: Option<f64>| {
-            let what = format!("{loop_name}, {words}: {what}");
-            let finding = Finding::new(CASE_SECTION, &format!("{slug}_{case}_{name}"), &[], &what, value, unit);
+            let text = format!("{loop_name}, {words}: {what}");
+            let finding = Finding::new(CASE_SECTION, &format!("{slug}_{case}_{name}"), &[], &text, value, unit);
+            let finding = finding.cell(&loop_name, words, what);
             study.find(match bound {
                 Some(bound) => finding.asked(Asked::AtLeast(bound)),
                 None => finding,
@@ -106,13 +107,11 @@ pub(super) fn tell_cases(study: &mut Study, plant: &Loop, flown: &[(&'static str
         find("baseline_cm", "RMS error, baseline", baseline, "cm", None);
         find("network_cm", "RMS error, network lane alone", network, "cm", None);
         find("both_cm", "RMS error, both lanes", both, "cm", None);
+        find("tripped", "flights in which the guard tripped a lane", comparison.tripped as f64, "", None);
         let reasons = comparison.trips_text();
-        let what = if reasons.is_empty() {
-            "flights in which the guard tripped a lane".to_owned()
-        } else {
-            format!("flights in which the guard tripped a lane (trips: {reasons})")
-        };
-        find("tripped", &what, comparison.tripped as f64, "", None);
+        if !reasons.is_empty() {
+            study.note(CASE_SECTION, &format!("{loop_name}, {words}: trips of the guard in all flights together: {reasons}."));
+        }
     }
 }
 
@@ -155,8 +154,9 @@ pub(super) fn draw_deviations(study: &mut Study, plant: &Loop, flown: &Deviation
             ("both_cm", "RMS error, both lanes", both, "cm"),
             ("tripped", "flights in which the guard tripped a lane", flown.tripped as f64, ""),
         ] {
-            let what = format!("{loop_name}, {what}: {words}");
-            study.find(Finding::new(DEVIATION_SECTION, &format!("{slug}_{key}_{way}"), &[], &what, value, unit));
+            let text = format!("{loop_name}, {what}: {words}");
+            let found = Finding::new(DEVIATION_SECTION, &format!("{slug}_{key}_{way}"), &[], &text, value, unit);
+            study.find(found.cell(&loop_name, what, words));
         }
     };
     for (parameter, flown) in PARAMETERS.iter().zip(&flown.parameters) {
@@ -231,9 +231,11 @@ pub(super) fn draw_effort(study: &mut Study, plant: &Loop, designs: &[Design], b
         .map(|(label, value)| Curve::line_and_dots(label, designs.iter().map(|design| (design.effort, margin(value(design))))));
     study.draw(figure("margins", format!("{loop_name}: margins by effort"), effort(), "margin", curves.to_vec()));
 
-    let mut find = |name: String, what: &str, value: f64, unit: &str| {
-        let what = format!("{loop_name}: {what}");
-        study.find(Finding::new(EFFORT_SECTION, &format!("{slug}_{name}"), &[], &what, value, unit));
+    let mut find = |name: String, effort: &str, what: &str, value: f64, unit: &str| {
+        let text = format!("{loop_name}, {effort}: {what}");
+        study.find(
+            Finding::new(EFFORT_SECTION, &format!("{slug}_{name}"), &[], &text, value, unit).cell(&loop_name, effort, what),
+        );
     };
     for design in designs {
         let key = format!("effort_{:.1e}", design.effort).replace('.', "_").replace('-', "_minus_");
@@ -241,21 +243,21 @@ pub(super) fn draw_effort(study: &mut Study, plant: &Loop, designs: &[Design], b
         for (index, label) in labels.iter().enumerate() {
             let (mean, worst) = design.reductions[index];
             let delay = ["nominal", "plus_10_ms", "plus_20_ms"][index];
-            find(format!("{key}_{delay}_mean"), &format!("{with}, {label}: reduction, both lanes"), mean, "%");
-            find(format!("{key}_{delay}_worst"), &format!("{with}, {label}: worst flight"), worst, "%");
+            find(format!("{key}_{delay}_mean"), &with, &format!("reduction, {label}"), mean, "%");
+            find(format!("{key}_{delay}_worst"), &with, &format!("worst flight, {label}"), worst, "%");
         }
-        find(format!("{key}_delay_margin"), &format!("{with}: delay margin"), margin(design.margins.delay_ms), "ms");
-        find(format!("{key}_gain_margin"), &format!("{with}: gain margin"), margin(design.margins.gain), "");
-        find(format!("{key}_modulus_margin"), &format!("{with}: modulus margin"), margin(design.margins.modulus), "");
+        find(format!("{key}_delay_margin"), &with, "delay margin", margin(design.margins.delay_ms), "ms");
+        find(format!("{key}_gain_margin"), &with, "gain margin", margin(design.margins.gain), "");
+        find(format!("{key}_modulus_margin"), &with, "modulus margin", margin(design.margins.modulus), "");
         if let Some(error) = design.limit {
-            find(format!("{key}_limit"), &format!("{with}: reduction at the linear-quadratic-Gaussian limit"), limit(error), "%");
-            find(format!("{key}_limit_cm"), &format!("{with}: RMS error at the limit, hover"), 100.0 * error, "cm");
+            find(format!("{key}_limit"), &with, "reduction at the linear-quadratic-Gaussian limit", limit(error), "%");
+            find(format!("{key}_limit_cm"), &with, "RMS error at the limit, hover", 100.0 * error, "cm");
         }
     }
     let mut jitter = 0.0;
     for axis in 0..3 {
         jitter += gaussian::baseline_variance(&linearise(plant, axis)?).unwrap_or(f64::NAN);
     }
-    find("hover_cm".into(), "RMS error of the baseline at hover, from the linear loop", 100.0 * jitter.sqrt(), "cm");
+    find("hover_cm".into(), "baseline", "RMS error at hover, from the linear loop", 100.0 * jitter.sqrt(), "cm");
     Ok(())
 }

@@ -38,8 +38,9 @@ pub fn tell(study: &mut Study, slug: &str, content: &Content) {
             continue;
         }
         let mut find = |name: &str, what: &str, value: f64| {
-            let what = format!("{}: reduction, {words}, {what}", settings.nominal);
-            study.find(Finding::new(SECTION, &format!("{slug}_draws_{way}_{name}"), &[], &what, value, "%"));
+            let text = format!("{}: reduction, {words}, {what}", settings.nominal);
+            let found = Finding::new(SECTION, &format!("{slug}_draws_{way}_{name}"), &[], &text, value, "%");
+            study.find(found.cell(&settings.nominal, words, what));
         };
         find("mean", &format!("mean of {} vehicles", means.len()), means.iter().sum::<f64>() / means.len() as f64);
         for (name, what, share) in QUANTILES {
@@ -56,14 +57,17 @@ pub fn tell(study: &mut Study, slug: &str, content: &Content) {
     }
     let flights: usize = content.draws.iter().map(|draw| draw.both.len()).sum();
     let tripped: u32 = content.draws.iter().map(|draw| draw.tripped).sum();
-    study.find(Finding::new(
-        SECTION,
-        &format!("{slug}_draws_tripped"),
-        &[],
-        &format!("{}: share of the flights with both lanes in which the guard tripped a lane", settings.nominal),
-        100.0 * f64::from(tripped) / flights.max(1) as f64,
-        "%",
-    ));
+    study.find(
+        Finding::new(
+            SECTION,
+            &format!("{slug}_draws_tripped"),
+            &[],
+            &format!("{}: share of the flights with both lanes in which the guard tripped a lane", settings.nominal),
+            100.0 * f64::from(tripped) / flights.max(1) as f64,
+            "%",
+        )
+        .cell(&settings.nominal, "both lanes", "flights in which the guard tripped a lane"),
+    );
     study.draw(Figure {
         section: SECTION.into(),
         name: format!("{slug}_draws"),
