@@ -81,8 +81,8 @@ pub struct Properties {
     pub strict_degree: RelativeDegree,
     /// Practical: the first tick at which the step response is above [`THRESHOLD`] of its end.
     pub practical_degree: RelativeDegree,
-    /// Steady-state gain. The interval is wider by as much as the model's gain changes between the lowest frequency that the record
-    /// shows and rest: there a linear model of a loop that is not quite linear is extrapolated.
+    /// Steady-state gain. So far as errors are not white, and the model perhaps not the whole truth, the interval is wider by what the
+    /// model's gain changes between the lowest frequency that the record shows and rest: that is extrapolated.
     pub gain: Interval,
     /// Output at zero input, in the output's unit.
     pub offset: Interval,
@@ -127,7 +127,12 @@ impl Properties {
         Self {
             strict_degree: strict(identified),
             practical_degree: degree(&|model| model.first_above(THRESHOLD, horizon)),
-            gain: extrapolated(model, over(&TransferFunction::gain), lowest(record) * std::f64::consts::TAU * period_s),
+            gain: {
+                let angle = lowest(record) * std::f64::consts::TAU * period_s;
+                let change = coloured(&identified.noise) * (model.response(angle).norm() - model.gain().abs()).abs();
+                let found = over(&TransferFunction::gain);
+                Interval { low: found.low - change, value: found.value, high: found.high + change }
+            },
             offset: over(&|model| model.offset),
             reversal: over(&reversals),
             reversal_ticks: reversal(model, horizon).1,
@@ -141,9 +146,11 @@ impl Properties {
     }
 }
 
-fn extrapolated(model: &TransferFunction, gain: Interval, angle: f64) -> Interval {
-    let change = (model.response(angle).norm() - gain.value.abs()).abs();
-    Interval { low: gain.low - change, value: gain.value, high: gain.high + change }
+/// Share of the errors' variance that the error before tells, 0 to 1.
+fn coloured(errors: &[Vec<f64>]) -> f64 {
+    let square: f64 = errors.iter().flatten().map(|error| error * error).sum();
+    let product: f64 = errors.iter().flat_map(|errors| errors.windows(2)).map(|pair| pair[0] * pair[1]).sum();
+    if square > 0.0 { (product / square).clamp(0.0, 1.0).powi(2) } else { 0.0 }
 }
 
 /// Dead times with 95 % of the weight, round the best.

@@ -54,7 +54,7 @@ fn the_papers_second_system_is_flagged_by_its_reversal_and_by_its_zero() {
     let properties = &found.properties;
     assert!(properties.zeros.len() == 1 && properties.zeros[0].place == Place::Outside);
     assert!(properties.zeros[0].magnitude.contains(1.002), "{:?}", properties.zeros);
-    assert!(properties.gain.contains(-18.0 / 7.0), "{:?}", properties.gain);
+    assert!(properties.gain.contains(-18.0 / 7.0) && properties.gain.high - properties.gain.low < 0.2, "{:?}", properties.gain);
     // 450 against -2.57, and it takes about ten ticks until the sign is the final one.
     assert!(properties.reversal.low > 100.0 && (6..=12).contains(&properties.reversal_ticks), "{properties:?}");
     assert!(found.verdict_text().contains("1.002") && found.verdict_text().contains("without bound"), "{}", found.verdict_text());

@@ -41,7 +41,7 @@ const LOGS: [(&str, &str); 17] = logs![
 ];
 
 /// Flights of a folder, or those in the program.
-fn load(folder: Option<&Path>) -> Result<Vec<Flight>> {
+pub(super) fn load(folder: Option<&Path>) -> Result<Vec<Flight>> {
     let Some(folder) = folder else {
         return LOGS.iter().map(|(name, text)| Ok(Flight::parse(name, text)?)).collect();
     };
