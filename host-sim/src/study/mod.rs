@@ -194,6 +194,12 @@ impl Study {
         self.notes.push(Note { section: section.into(), text: text.into() });
     }
 
+    /// Those of some rows of the paper that no number answers.
+    #[cfg(test)]
+    fn unanswered(&self, rows: &[u8]) -> Vec<u8> {
+        rows.iter().copied().filter(|row| !self.findings.iter().any(|finding| finding.rows.contains(row))).collect()
+    }
+
     /// Numbers of a section.
     pub fn of_section<'a>(&'a self, section: &'a str) -> impl Iterator<Item = &'a Finding> {
         self.findings.iter().filter(move |finding| finding.section == section)
@@ -223,6 +229,15 @@ impl Study {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// That each study answers its rows is asserted in the tests of each.
+    #[test]
+    fn every_row_of_the_papers_promises_has_a_study() {
+        let mut rows = [lti::ROWS, extensions::ROWS, quadrotor::ROWS].concat();
+        rows.sort_unstable();
+        rows.dedup();
+        assert_eq!(rows, (1..=31).collect::<Vec<u8>>());
+    }
 
     #[test]
     fn a_bound_is_kept_or_not_and_no_number_keeps_none() {

@@ -14,6 +14,9 @@ use impromptu_lti::levenberg_marquardt::Settings;
 
 use super::Study;
 
+/// Rows of the paper's promises that are answered here.
+pub const ROWS: &[u8] = &[5, 11, 31];
+
 /// Networks small enough for plants of two states, and enough steps for them.
 const TRAINING: fn(usize, usize) -> Settings = |units, iterations| Settings { units, iterations, ..Settings::default() };
 /// Random trajectories in each trial.

@@ -15,6 +15,9 @@ use serde::{Deserialize, Serialize};
 
 use super::Study;
 
+/// Rows of the paper's promises that are answered here.
+pub const ROWS: &[u8] = &[3, 4, 6, 7, 8, 9, 10, 12, 13, 14, 16, 17, 18, 19];
+
 /// How the study is run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Settings {

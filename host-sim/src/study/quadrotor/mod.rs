@@ -31,6 +31,9 @@ use impromptu_firmware::{features::Feature, model::Interpolation};
 use impromptu_model_export::float_network::Activation;
 use predecessor::{DIVISOR, SPEED, at_its_pace, predecessor};
 
+/// Rows of the paper's promises that are answered here.
+pub const ROWS: &[u8] = &[1, 2, 15, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30];
+
 /// What the study covers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct QuadrotorSettings {

@@ -72,8 +72,6 @@ fn every_number_and_figure_has_a_name_of_its_own_and_a_row_of_the_paper() {
     names.dedup();
     assert_eq!(names.len(), count);
     assert!(QUICK.findings.iter().all(|finding| finding.value.is_finite() && !finding.rows.is_empty()));
-    for row in [1, 2].into_iter().chain(20..=30) {
-        assert!(QUICK.findings.iter().any(|finding| finding.rows.contains(&row)), "row {row}");
-    }
+    assert_eq!(QUICK.unanswered(ROWS), Vec::<u8>::new());
     assert!(QUICK.figures.iter().all(|figure| !figure.curves.is_empty() && figure.curves.len() <= 6));
 }
