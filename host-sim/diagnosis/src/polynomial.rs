@@ -54,24 +54,24 @@ pub fn is_stable(denominator: &[f64]) -> bool {
     true
 }
 
-/// Roots in z of `c0 zⁿ + c1 zⁿ⁻¹ + …`: eigenvalues of the companion matrix. Leading zeros are dropped.
+/// Roots in z of `c0 zⁿ + c1 zⁿ⁻¹ + …`, by falling magnitude: eigenvalues of the companion matrix. Leading zeros are dropped; a constant has
+/// no root.
 pub fn roots(polynomial: &[f64]) -> Vec<Complex<f64>> {
-    let Some(start) = polynomial.iter().position(|c| *c != 0.0) else { return Vec::new() };
-    let c = &polynomial[start..];
-    let degree = c.len() - 1;
-    if degree == 0 {
-        return Vec::new();
-    }
-    let companion = DMatrix::from_fn(degree, degree, |row, column| {
-        if row == 0 {
-            -c[column + 1] / c[0]
-        } else if row == column + 1 {
-            1.0
-        } else {
-            0.0
-        }
+    let start = polynomial.iter().position(|c| *c != 0.0).unwrap_or(polynomial.len());
+    let Some((leading, rest)) = polynomial[start..].split_first() else { return Vec::new() };
+    // Roots at zero are exact, and a companion matrix with them converges badly.
+    let zeros = rest.iter().rev().take_while(|c| **c == 0.0).count();
+    let order = rest.len() - zeros;
+    let companion = DMatrix::from_fn(order, order, |row, column| match (row, column) {
+        (0, column) => -rest[column] / leading,
+        (row, column) if row == column + 1 => 1.0,
+        _ => 0.0,
     });
-    companion.complex_eigenvalues().iter().copied().collect()
+    let mut roots: Vec<Complex<f64>> =
+        if order == 0 { Vec::new() } else { companion.complex_eigenvalues().iter().copied().collect() };
+    roots.extend(std::iter::repeat_n(Complex::new(0.0, 0.0), zeros));
+    roots.sort_by(|a, b| b.norm().total_cmp(&a.norm()).then(b.im.total_cmp(&a.im)));
+    roots
 }
 
 #[cfg(test)]
@@ -91,7 +91,24 @@ mod tests {
         })
     }
 
+    #[test]
+    fn leading_and_trailing_zeros_change_the_order_and_the_roots_at_zero() {
+        let found = roots(&[0.0, 1.0, -0.5, 0.0]);
+        assert_eq!(found.len(), 2);
+        assert!((found[0].re - 0.5).abs() < 1e-15 && found[1].norm() == 0.0);
+        assert!(roots(&[3.0]).is_empty() && roots(&[]).is_empty());
+    }
+
     proptest! {
+        #[test]
+        fn a_polynomial_vanishes_at_its_roots(tail in proptest::collection::vec(-2.0..2.0f64, 1..6)) {
+            let polynomial: Vec<f64> = std::iter::once(1.0).chain(tail).collect();
+            for root in roots(&polynomial) {
+                let value = polynomial.iter().fold(Complex::new(0.0, 0.0), |value, c| value * root + c);
+                prop_assert!(value.norm() < 1e-6 * (1.0 + root.norm().powi(polynomial.len() as i32)));
+            }
+        }
+
         #[test]
         fn roots_come_back_and_decide_stability(mut wanted in proptest::collection::vec(-1.8f64..1.8, 1..4)) {
             wanted.sort_by(f64::total_cmp);

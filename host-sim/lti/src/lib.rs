@@ -26,7 +26,6 @@ pub mod multisine;
 pub mod network;
 pub mod nonlinear;
 pub mod normal_equations;
-pub mod polynomial;
 pub mod samples;
 pub mod scalar;
 pub mod signal;

@@ -3,9 +3,8 @@
 //! *in* numerator and denominator; *out* poles, zeros, DC gain, relative degree; *never* a denominator that is not monic (those of
 //! [`StateSpace`](crate::StateSpace) are); *source* Zhou 2017, equation (8).
 
+use impromptu_diagnosis::polynomial;
 use nalgebra::Complex;
-
-use crate::polynomial;
 
 /// (β_{n-r} z^{n-r} + … + β_0) / (zⁿ + α_{n-1} z^{n-1} + … + α_0), highest power first.
 #[derive(Clone, Debug, PartialEq)]
