@@ -102,7 +102,10 @@ fn text(study: &study::Study) -> String {
         let (grids, others) = grids(study.of_section(section));
         for grid in grids {
             text += &format!("\n{}\n", grid.title);
-            let header = std::iter::once("").chain(grid.columns.iter().copied()).map(str::to_owned);
+            // A title of several parts takes several lines: the numbers below it are short.
+            let header = std::iter::once("")
+                .chain(grid.columns.iter().copied())
+                .map(|title| title.replace(", ", ",\n").replace(": ", ":\n"));
             let rows = grid.rows.iter().map(|(title, cells)| {
                 let cells = cells.iter().map(|cell| cell.map_or_else(String::new, in_cell));
                 std::iter::once((*title).to_owned()).chain(cells).collect::<Vec<_>>()

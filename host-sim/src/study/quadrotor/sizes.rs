@@ -55,7 +55,11 @@ pub(super) fn run(crazyflie: &Crazyflie, study: &mut Study) -> anyhow::Result<()
             let activation = if hidden.len() > 2 { Activation::Relu } else { Activation::Tanh };
             let network = match hidden.is_empty() {
                 true => crazyflie.linear(),
-                false => TrainingSettings { hidden: hidden.to_vec(), activation, ..crazyflie.recipe.network.clone() },
+                // Large networks must not look poor because they were trained for a short time.
+                false => {
+                    let epochs = 3 * crazyflie.recipe.network.epochs;
+                    TrainingSettings { hidden: hidden.to_vec(), activation, epochs, ..crazyflie.recipe.network.clone() }
+                }
             };
             let recipe = Recipe { network, ..crazyflie.recipe.clone() };
             let mut flown = Vec::new();
