@@ -51,6 +51,48 @@ fn the_log_of_any_loop_is_diagnosed() {
 }
 
 #[test]
+fn a_flight_that_broke_down_is_left_out_and_a_log_of_unknown_kind_only_named() {
+    let folder = Folder::new();
+    folder.fine("collect --condition lab --signal spline --flights 3 --seconds 25 --out logs");
+    let good = folder.files("logs", ".csv").join(" ");
+    let wanted = folder.fine(&format!("diagnose --log {good} --axis x --delay-ms 24")).stdout;
+    // A copy of a flight in which the vehicle leaves half way.
+    let text = String::from_utf8(folder.read(&folder.files("logs", ".csv")[0])).unwrap();
+    let column = text.lines().next().unwrap().split(',').position(|name| name == "measured_x_m").unwrap();
+    let lines = text.lines().enumerate().map(|(line, text)| {
+        let mut cells: Vec<String> = text.split(',').map(str::to_owned).collect();
+        if line > 1200 {
+            cells[column] = (40.0 + line as f64).to_string();
+        }
+        cells.join(",") + "\n"
+    });
+    folder.write("gone.csv", lines.collect::<String>());
+    let run = folder.fine(&format!("diagnose --log {good} gone.csv --axis x --delay-ms 24"));
+    assert!(run.stderr.contains("gone.csv") && run.stderr.contains("broke down; left out"), "{}", run.stderr);
+    let after_the_source = |text: &str| text.split_once('\n').unwrap().1.to_owned();
+    assert_eq!(after_the_source(&run.stdout), after_the_source(&wanted));
+    for (name, seed) in [("a", 1.0), ("b", 1.0), ("c", 9.0)] {
+        folder.write(
+            &format!("{name}.csv"),
+            log(1.0, 900)
+                .replace(",reference", ",setpoint")
+                .lines()
+                .enumerate()
+                .map(|(line, text)| {
+                    let mut cells: Vec<String> = text.split(',').map(str::to_owned).collect();
+                    if line > 0 {
+                        cells[1..].iter_mut().for_each(|cell| *cell = (seed * cell.parse::<f64>().unwrap()).to_string());
+                    }
+                    cells.join(",") + "\n"
+                })
+                .collect::<String>(),
+        );
+    }
+    let run = folder.fine("diagnose --log a.csv b.csv c.csv --columns time_s,setpoint,measured");
+    assert!(run.stderr.contains("warning: c.csv") && run.stderr.contains("leave the log out"), "{}", run.stderr);
+}
+
+#[test]
 fn what_is_wrong_with_a_log_and_what_to_do_is_said() {
     let folder = Folder::new();
     let good = log(1.0, 400);
