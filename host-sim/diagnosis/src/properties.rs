@@ -3,6 +3,7 @@
 //! *in* an identified model and draws from its distribution; *out* [`Properties`]; *never* a value outside of its interval;
 //! *source* Zhou 2017, Insight 1 (relative degree, zero dynamics), Lemma 1 (gain).
 
+use nalgebra::DVector;
 use serde::Serialize;
 
 use crate::{excitation::lowest, identification::Identified, record::Record, transfer_function::TransferFunction};
@@ -127,12 +128,7 @@ impl Properties {
         Self {
             strict_degree: strict(identified),
             practical_degree: degree(&|model| model.first_above(THRESHOLD, horizon)),
-            gain: {
-                let angle = lowest(record) * std::f64::consts::TAU * period_s;
-                let change = coloured(&identified.noise) * (model.response(angle).norm() - model.gain().abs()).abs();
-                let found = over(&TransferFunction::gain);
-                Interval { low: found.low - change, value: found.value, high: found.high + change }
-            },
+            gain: gain(identified, record),
             offset: over(&|model| model.offset),
             reversal: over(&reversals),
             reversal_ticks: reversal(model, horizon).1,
@@ -144,6 +140,24 @@ impl Properties {
             explained,
         }
     }
+}
+
+/// The gain, and 95 % of it by the coefficients' covariance, linearised: draws of coefficients whose poles nearly cancel zeros leave the
+/// valley in which the data hold them, and their gains with it.
+fn gain(identified: &Identified, record: &Record) -> Interval {
+    let Identified { model, covariance, .. } = identified;
+    let value = model.gain();
+    let sum: f64 = model.denominator.iter().sum();
+    let (terms, order) = (model.numerator.len(), model.denominator.len() - 1);
+    let slope = DVector::from_fn(covariance.nrows(), |index, _| match index {
+        _ if index < terms => 1.0 / sum,
+        _ if index < terms + order => -value / sum,
+        _ => 0.0,
+    });
+    let reach = 1.96 * slope.dot(&(covariance * &slope)).max(0.0).sqrt();
+    let angle = lowest(record) * std::f64::consts::TAU * record.period_s;
+    let reach = reach + coloured(&identified.noise) * (model.response(angle).norm() - value.abs()).abs();
+    Interval { low: value - reach, value, high: value + reach }
 }
 
 /// Share of the errors' variance that the error before tells, 0 to 1.
