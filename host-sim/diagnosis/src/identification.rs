@@ -37,6 +37,9 @@ pub struct Identified {
 const HIGHEST_ORDER: usize = 4;
 /// Blocks from which the errors' spread is taken, at most: fewer and longer ones where the loop settles slowly.
 const MOST_BLOCKS: usize = 60;
+/// A draw that leaves more than this times what the model leaves of the log, in mean square, could not be the true one: where poles nearly
+/// cancel zeros, a normal distribution of coefficients reaches far out of the data's valley.
+const WORSE: f64 = 1.5;
 /// Longest dead time tried, ticks.
 const LONGEST_DEAD_TIME: usize = 12;
 
@@ -101,15 +104,20 @@ pub fn identify(record: &Record) -> Option<Identified> {
     })
 }
 
-/// The offset that leaves no mean. Whitening takes slow noise away and the constant with it, so that the whitened one is uncertain.
-fn level(model: &mut TransferFunction, record: &Record) {
-    let (mut sum, mut count) = (0.0, 0);
+/// The offset that leaves no mean. Whitening takes slow noise away and the constant with it, so that the whitened one is uncertain. Gives the
+/// mean square of what is then left.
+fn level(model: &mut TransferFunction, record: &Record) -> f64 {
+    let (mut sum, mut squares, mut count) = (0.0, 0.0, 0);
     for segment in &record.segments {
-        let errors = segment.measured.iter().zip(model.simulate(&segment.reference)).map(|(y, model)| y - model);
-        sum += errors.sum::<f64>();
+        for (y, simulated) in segment.measured.iter().zip(model.simulate(&segment.reference)) {
+            sum += y - simulated;
+            squares += (y - simulated).powi(2);
+        }
         count += segment.measured.len();
     }
-    model.offset += sum / count.max(1) as f64;
+    let mean = sum / count.max(1) as f64;
+    model.offset += mean;
+    squares / count.max(1) as f64 - mean * mean
 }
 
 fn best(candidates: &[Candidate]) -> Option<&Candidate> {
@@ -124,6 +132,7 @@ impl Identified {
         let jittered = &self.covariance + DMatrix::from_diagonal(&self.covariance.diagonal()) * 1e-7;
         let Some(root) = jittered.cholesky().map(|cholesky| cholesky.l()) else { return vec![self.model.clone(); count] };
         let centre = coefficients(&self.model);
+        let bound = WORSE * level(&mut self.model.clone(), record);
         let mut draws = Vec::with_capacity(count);
         for _ in 0..20 * count {
             if draws.len() == count {
@@ -132,8 +141,10 @@ impl Identified {
             let normal = DVector::from_fn(size, |_, _| StandardNormal.sample(random));
             let mut model = self.model.with(&(&centre + &root * normal));
             if is_stable(&model.denominator) {
-                level(&mut model, record);
-                draws.push(model);
+                let left = level(&mut model, record);
+                if left <= bound {
+                    draws.push(model);
+                }
             }
         }
         draws.resize(count, self.model.clone());

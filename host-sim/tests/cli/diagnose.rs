@@ -136,6 +136,7 @@ fn a_simulated_loop_is_diagnosed_on_every_axis() {
         assert!(channel["diagnosis"]["prediction"]["reduction_percent"]["low"].as_f64().unwrap() > 70.0, "{channel}");
     }
     let steps = folder.fine("diagnose --vehicle crazyflie --condition lab --test steps --axis x").stdout;
+    assert!(steps.contains("will help: stable inverse, gain of one"), "{steps}");
     assert!(steps.contains("steps of the position reference") && steps.contains("\nx\n") && !steps.contains("\ny\n"), "{steps}");
 }
 
