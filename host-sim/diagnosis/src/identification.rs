@@ -336,6 +336,10 @@ impl Whitened {
             let pull = root.tr_mul(pull) / variance;
             squares.ger(1.0, &pull, &pull, 1.0);
         }
+        // A log without any noise leaves nothing to tell a spread from.
+        if !squares.iter().all(|square: &f64| square.is_finite()) {
+            return white.clone();
+        }
         // White errors seen in so few blocks reach to the edge of Marchenko and Pastur's law.
         let edge = (1.0 + (size / blocks.len().max(1) as f64).sqrt()).powi(2);
         let mut eigen = squares.symmetric_eigen();

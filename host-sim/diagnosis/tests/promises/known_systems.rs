@@ -61,6 +61,18 @@ fn the_papers_second_system_is_flagged_by_its_reversal_and_by_its_zero() {
 }
 
 #[test]
+fn a_log_without_noise_is_diagnosed_too() {
+    for numerator in [[0.35, 0.0], [0.5, -0.15]] {
+        let found = diagnosis(&step_test(&paper(numerator), 2000, 0.0));
+        let gain = found.properties.gain;
+        assert!(
+            found.verdict == Verdict::WillHelp && gain.high - gain.low < 1e-3 && (gain.value - 1.0).abs() < 1e-6,
+            "{found:#?}"
+        );
+    }
+}
+
+#[test]
 fn two_unstable_zeros_are_found_although_no_step_response_starts_the_wrong_way() {
     // Real zeros at 1.15 and 1.25: the step response starts with the sign of its end.
     let model = TransferFunction {
