@@ -53,6 +53,8 @@ const TOLERANCE: f64 = 1.03;
 const WIDENING: f64 = 0.3;
 /// ...and by this much, in percentage points.
 const LEAST_WIDENING: f64 = 0.5;
+/// Size in which what the model does not explain comes a second time, at worst.
+const AGAIN: f64 = std::f64::consts::SQRT_2;
 /// Most samples that are simulated in a draw.
 const LONGEST: usize = 4_000;
 /// Signals are flown at up to this factor of their speed, or as much slower.
@@ -98,8 +100,8 @@ pub fn predict(
     let found = Interval::of(reduction(&(baseline, error)), outcomes.iter().map(reduction));
     let floor = root_mean_square(identified.noise.iter().flatten().copied());
     // What the model does not explain need not come from outside: so far as it is the loop's own answer to its references (limits, other
-    // axes), the add-on's references bring it a second time.
-    let twice = |error: f64| error.hypot(floor);
+    // axes), the add-on's references, which move more, bring it a second time.
+    let twice = |error: f64| error.hypot(AGAIN * floor);
     let wider = |end: f64| end + (end - found.value) * WIDENING + (end - found.value).signum() * LEAST_WIDENING;
     let with_add_on = Interval::of(error, outcomes.iter().map(|outcome| outcome.1));
     Some(Prediction {

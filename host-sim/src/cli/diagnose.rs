@@ -34,8 +34,9 @@ Log steps of random height, or five tones and more, over the band that will be f
 measured is what the loop was told; if that is old, say how old with --delay-ms.
 
 Relative degree, gain, zeros and bandwidth are those of the reference to the measured value at the sub-rate. Intervals hold 95 % of the
-linear models that could be the true one; what is not linear they do not know. The predicted reduction is that of a linear window over the desired output, trained on such a log and
-flown along signals of the log's kind: measured errors, so with the noise in them.
+linear models that could be the true one; at the lower end of the predicted reduction, what the log leaves unexplained is the loop's doing and
+comes again, 1.4 times as large. The prediction is about a linear window over the desired output, trained on such a log and flown along signals
+of the log's kind: measured errors, so with the noise in them.
 
 Examples:
   host-sim diagnose --log monday.csv tuesday.csv --delay-ms 24
@@ -136,7 +137,10 @@ impl Diagnose {
                 };
                 (source, AXES.iter().enumerate().map(axis).collect::<Result<Vec<_>, DiagnosisError>>()?)
             }
-            None => (format!("{} log(s)", self.log.len()), self.channels(session)?),
+            None => {
+                let (kept, channels) = self.channels(session)?;
+                (format!("{kept} log(s)"), channels)
+            }
         };
         let wanted = |channel: &Channel| self.axis.is_empty() || self.axis.contains(&channel.name);
         let mut diagnosed = Diagnosed { seed, source, channels: Vec::new(), refused: Vec::new() };
@@ -156,16 +160,16 @@ impl Diagnose {
         session.format.print(&diagnosed, || text(&diagnosed))
     }
 
-    /// Channels of the logs, those of one name joined. Flights in which the loop broke down are left out, as `train` does; of other loops
+    /// How many logs are used, and their channels, those of one name joined. Flights in which the loop broke down are left out, as `train` does; of other loops
     /// nobody knows the scale of their errors, so that such a log is only named.
-    fn channels(&self, session: &Session) -> Result<Vec<Channel>> {
+    fn channels(&self, session: &Session) -> Result<(usize, Vec<Channel>)> {
         let age_s = self.delay_ms.unwrap_or(0.0) / 1e3;
         let columns = self.columns.as_ref().map(|columns| &columns.0);
         let of_file = |path: &PathBuf| Ok((path.display().to_string(), read(path, columns, age_s).context("--log")?));
         let files = self.log.iter().map(of_file).collect::<Result<Vec<_>>>()?;
         let errors: Vec<f64> = files.iter().map(|(_, channels)| largest_error(channels)).collect();
         let bound = largest_sound_error(&errors);
-        let mut joined: Vec<Channel> = Vec::new();
+        let (mut kept, mut joined): (usize, Vec<Channel>) = (0, Vec::new());
         for ((path, channels), error) in files.into_iter().zip(errors) {
             let flight = channels.iter().all(|channel| AXES.contains(&channel.name.as_str()));
             if error > bound {
@@ -176,6 +180,7 @@ impl Diagnose {
                 }
                 session.console.note(&format!("warning: {away}; if the loop broke down there, leave the log out"));
             }
+            kept += 1;
             for channel in channels {
                 match joined.iter_mut().find(|known| known.name == channel.name) {
                     Some(known) => {
@@ -186,7 +191,7 @@ impl Diagnose {
                 }
             }
         }
-        Ok(joined)
+        Ok((kept, joined))
     }
 }
 

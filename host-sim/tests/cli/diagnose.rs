@@ -69,8 +69,7 @@ fn a_flight_that_broke_down_is_left_out_and_a_log_of_unknown_kind_only_named() {
     folder.write("gone.csv", lines.collect::<String>());
     let run = folder.fine(&format!("diagnose --log {good} gone.csv --axis x --delay-ms 24"));
     assert!(run.stderr.contains("gone.csv") && run.stderr.contains("broke down; left out"), "{}", run.stderr);
-    let after_the_source = |text: &str| text.split_once('\n').unwrap().1.to_owned();
-    assert_eq!(after_the_source(&run.stdout), after_the_source(&wanted));
+    assert_eq!(run.stdout, wanted);
     for (name, seed) in [("a", 1.0), ("b", 1.0), ("c", 9.0)] {
         folder.write(
             &format!("{name}.csv"),
@@ -133,7 +132,8 @@ fn a_simulated_loop_is_diagnosed_on_every_axis() {
     for axis in 0..3 {
         let channel = &found["channels"][axis];
         assert_eq!(channel["diagnosis"]["verdict"], "will_help", "{channel}");
-        assert!(channel["diagnosis"]["prediction"]["reduction_percent"]["low"].as_f64().unwrap() > 70.0, "{channel}");
+        let reduction = |end: &str| channel["diagnosis"]["prediction"]["reduction_percent"][end].as_f64().unwrap();
+        assert!(reduction("value") > 75.0 && reduction("low") > 60.0, "{channel}");
     }
     let steps = folder.fine("diagnose --vehicle crazyflie --condition lab --test steps --axis x").stdout;
     assert!(steps.contains("will help: stable inverse, gain of one"), "{steps}");

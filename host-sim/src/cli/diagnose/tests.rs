@@ -26,18 +26,19 @@ fn adapted(desired: &Trajectory, add_ons: &[(AddOn, usize); 3]) -> Trajectory {
 /// 95 % are promised; what was chosen was chosen on other seeds.
 #[test]
 fn what_is_predicted_for_a_vehicle_is_what_it_then_flies() {
-    let flown: Vec<(Interval, f64)> = [("crazyflie", 11), ("crazyflie", 12), ("crazyflie-brushless", 13)]
-        .into_iter()
-        .flat_map(|(vehicle, seed)| predicted_and_flown(vehicle, seed))
-        .collect();
+    let flown: Vec<(Interval, f64)> =
+        [("crazyflie", "lab", 11), ("crazyflie", "clean", 12), ("crazyflie-brushless", "rough", 13)]
+            .into_iter()
+            .flat_map(|(vehicle, condition, seed)| predicted_and_flown(vehicle, condition, seed))
+            .collect();
     let covered = flown.iter().filter(|(predicted, measured)| predicted.contains(*measured)).count();
     assert!(covered + 1 >= flown.len(), "{covered} of {}: {flown:#?}", flown.len());
-    assert!(flown.iter().all(|(predicted, _)| predicted.high - predicted.low < 20.0), "{flown:#?}");
+    assert!(flown.iter().all(|(predicted, _)| predicted.high - predicted.low < 40.0), "{flown:#?}");
 }
 
 /// Predicted and flown reduction, %, axis by axis.
-fn predicted_and_flown(vehicle: &str, seed: u64) -> [(Interval, f64); 3] {
-    let plant = plant(vehicle, "stock", "lab").unwrap();
+fn predicted_and_flown(vehicle: &str, condition: &str, seed: u64) -> [(Interval, f64); 3] {
+    let plant = plant(vehicle, "stock", condition).unwrap();
     let age_s = plant.condition.measurement_delay_s;
     let recipe = Recipe::default();
     let logs = Test::Multisine.fly(&plant, &recipe, 100 * seed).unwrap();

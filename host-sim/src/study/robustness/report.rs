@@ -34,7 +34,7 @@ pub(super) fn explain(study: &mut Study, settings: &Settings) {
     study.note(
         CASE_SECTION,
         "Drag x4 needs corrections larger than the fast part of the feedback lane may give where errors are large already (its clamp, halved at an \
-         error of `error_scale`); in some of these flights the guard hands a lane over besides. Wider clamps are choices of the recipe: they cost \
+         error of the lane's scale, 0.1 m); in some of these flights the guard hands a lane over besides. Wider clamps are choices of the recipe: they cost \
          robustness against delay on some vehicles, which the validation flights tell.",
     );
     study.note(
