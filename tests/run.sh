@@ -73,6 +73,10 @@ say "formatting"
 cargo fmt --all --check || fail "formatting; run: cargo fmt --all"
 cargo fmt --manifest-path tests/fuzz/Cargo.toml --check || fail "formatting; run: cargo fmt --manifest-path tests/fuzz/Cargo.toml"
 
+say "locked versions of the fuzz targets"
+cargo metadata --manifest-path tests/fuzz/Cargo.toml --locked --format-version 1 >/dev/null ||
+    fail "tests/fuzz/Cargo.lock is not up to date; run: cargo update --workspace --manifest-path tests/fuzz/Cargo.toml"
+
 say "clippy"
 cargo clippy --workspace --all-targets --locked -- -D warnings
 
