@@ -4,7 +4,7 @@ use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::{Session, output::table, situation::Situation};
+use super::{Invocation, output::table, situation::Situation};
 use crate::{
     experiment::{Excitation, Purpose, Recipe, Signal, demo::Observer as _},
     flight_log::FlightLog,
@@ -85,19 +85,19 @@ struct Log {
 }
 
 impl Collect {
-    pub(super) fn run(self, session: &Session) -> Result<()> {
+    pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
         let plant = self.situation.plant()?;
-        let recipe = session.configuration.recipe();
+        let recipe = invocation.configuration.recipe();
         let excitations = self.excitations(recipe);
         if excitations.is_empty() {
             bail!("the recipe names no training flights; give --signal");
         }
-        let folder = session.configuration.folder()?;
-        let seed = session.configuration.seed();
-        session.console.note(&format!("seed {seed}"));
+        let folder = invocation.configuration.folder()?;
+        let seed = invocation.configuration.seed();
+        invocation.console.note(&format!("seed {seed}"));
         let dither = self.dither.map(|amplitude| Dither { amplitude, hold_s: recipe.lane.dither_hold_s });
         let purpose = if dither.is_some() { Purpose::Identification } else { Purpose::Training };
-        let mut first = session.configuration.seed_of(purpose);
+        let mut first = invocation.configuration.seed_of(purpose);
         let mut logs = Vec::new();
         for (index, excitation) in (1..).zip(&excitations) {
             let flown = plant.collect(&excitation.motions(first), dither, first)?;
@@ -109,11 +109,11 @@ impl Collect {
                 logs.push(entry(log, file.display().to_string()));
             }
             first = first.wrapping_add(u64::from(excitation.flights));
-            session.console.steps(index, excitations.len() as u64);
+            invocation.console.steps(index, excitations.len() as u64);
         }
-        session.console.finish();
+        invocation.console.finish();
         let collected = Collected { seed, logs };
-        session.format.print(&collected, || text(&collected))
+        invocation.format.print(&collected, || text(&collected))
     }
 
     /// What is flown: the recipe's flights, or those asked for with the recipe's figures where it has any.

@@ -4,29 +4,29 @@ use std::path::Path;
 
 use anyhow::Result;
 
-use super::{Session, output};
+use super::{Invocation, output};
 use crate::{
     experiment::demo,
     report::{Results, console_table, write_flights_csv, write_html, write_table_csv},
 };
 
 /// Runs the demo and shows what came of it.
-pub(super) fn run(session: &Session) -> Result<()> {
+pub(super) fn run(invocation: &Invocation) -> Result<()> {
     // Before the minutes of work: a folder that cannot be made is refused now.
-    let folder = session.configuration.folder()?;
-    let settings = demo::DemoSettings { out: Some(folder.clone()), ..session.configuration.settings.clone() };
-    session.console.note(&format!("seed {}", settings.seed));
-    let mut results = demo::run(&settings, &session.console)?;
-    session.console.finish();
-    results.command = session.command.clone();
-    session.console.note(&format!("models and flight logs: {0}/models, {0}/logs", folder.display()));
+    let folder = invocation.configuration.folder()?;
+    let settings = demo::DemoSettings { out: Some(folder.clone()), ..invocation.configuration.settings.clone() };
+    invocation.console.note(&format!("seed {}", settings.seed));
+    let mut results = demo::run(&settings, &invocation.console)?;
+    invocation.console.finish();
+    results.command = invocation.command.clone();
+    invocation.console.note(&format!("models and flight logs: {0}/models, {0}/logs", folder.display()));
     output::write(&folder.join("results.json"), results.to_json()?.as_bytes())?;
-    session.console.note(&format!("results: {}", folder.join("results.json").display()));
-    show(session, &results, &folder)
+    invocation.console.note(&format!("results: {}", folder.join("results.json").display()));
+    show(invocation, &results, &folder)
 }
 
 /// Prints results and writes their views into a folder.
-pub(super) fn show(session: &Session, results: &Results, folder: &Path) -> Result<()> {
+pub(super) fn show(invocation: &Invocation, results: &Results, folder: &Path) -> Result<()> {
     let (mut table, mut flights) = (Vec::new(), Vec::new());
     write_table_csv(&results.table, &mut table)?;
     write_flights_csv(&results.per_flight, &mut flights)?;
@@ -34,9 +34,9 @@ pub(super) fn show(session: &Session, results: &Results, folder: &Path) -> Resul
     write_html(results, &page)?;
     output::write(&table_file, &table)?;
     output::write(&flights_file, &flights)?;
-    session.console.note(&format!("table: {}, flights: {}", table_file.display(), flights_file.display()));
-    session.console.note(&format!("report: {}", page.display()));
-    match session.format {
+    invocation.console.note(&format!("table: {}, flights: {}", table_file.display(), flights_file.display()));
+    invocation.console.note(&format!("report: {}", page.display()));
+    match invocation.format {
         output::Format::Table => output::print(&console_table(results)),
         output::Format::Json => output::print(&(results.to_json()? + "\n")),
     }

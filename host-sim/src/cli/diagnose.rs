@@ -13,7 +13,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 
 use super::{
-    Session,
+    Invocation,
     situation::{milliseconds, plant},
 };
 use crate::{
@@ -118,18 +118,18 @@ struct Refused {
 }
 
 impl Diagnose {
-    pub(super) fn run(self, session: &Session) -> Result<()> {
-        let seed = session.configuration.seed();
+    pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
+        let seed = invocation.configuration.seed();
         let settings = Settings { sub_rate_hz: self.sub_rate, seed, ..Settings::default() };
-        session.console.stage("diagnosing");
+        invocation.console.stage("diagnosing");
         let (source, channels) = match &self.vehicle {
             Some(vehicle) => {
                 let plant = plant(vehicle, &self.gains, &self.condition)?;
                 let source = format!("{} {} {}, {}", plant.vehicle.name, plant.gains, plant.condition.name, self.test.words());
                 let logs = self.test.fly(
                     &plant,
-                    session.configuration.recipe(),
-                    session.configuration.seed_of(Purpose::Identification),
+                    invocation.configuration.recipe(),
+                    invocation.configuration.seed_of(Purpose::Identification),
                 )?;
                 let age_s = self.delay_ms.map_or(plant.condition.measurement_delay_s, |delay| delay / 1e3);
                 let axis = |(index, axis): (usize, &&str)| {
@@ -138,7 +138,7 @@ impl Diagnose {
                 (source, AXES.iter().enumerate().map(axis).collect::<Result<Vec<_>, DiagnosisError>>()?)
             }
             None => {
-                let (kept, channels) = self.channels(session)?;
+                let (kept, channels) = self.channels(invocation)?;
                 (format!("{kept} log(s)"), channels)
             }
         };
@@ -152,17 +152,17 @@ impl Diagnose {
                 Err(error) => diagnosed.refused.push(Refused { name, why: error.to_string() }),
             }
         }
-        session.console.finish();
+        invocation.console.finish();
         if diagnosed.channels.is_empty() {
             let why: Vec<String> = diagnosed.refused.iter().map(|Refused { name, why }| format!("{name}: {why}")).collect();
             bail!(if why.is_empty() { "--axis: the logs have no such axis".into() } else { why.join("; ") });
         }
-        session.format.print(&diagnosed, || text(&diagnosed))
+        invocation.format.print(&diagnosed, || text(&diagnosed))
     }
 
     /// How many logs are used, and their channels, those of one name joined. Flights in which the loop broke down are left out, as `train` does; of other loops
     /// nobody knows the scale of their errors, so that such a log is only named.
-    fn channels(&self, session: &Session) -> Result<(usize, Vec<Channel>)> {
+    fn channels(&self, invocation: &Invocation) -> Result<(usize, Vec<Channel>)> {
         let age_s = self.delay_ms.unwrap_or(0.0) / 1e3;
         let columns = self.columns.as_ref().map(|columns| &columns.0);
         let of_file = |path: &PathBuf| Ok((path.display().to_string(), read(path, columns, age_s).context("--log")?));
@@ -175,10 +175,10 @@ impl Diagnose {
             if error > bound {
                 let away = format!("{path}: up to {error:.3} from the reference, beside {bound:.3} in a usual log at most");
                 if flight {
-                    session.console.note(&format!("{away}: the loop broke down; left out"));
+                    invocation.console.note(&format!("{away}: the loop broke down; left out"));
                     continue;
                 }
-                session.console.note(&format!("warning: {away}; if the loop broke down there, leave the log out"));
+                invocation.console.note(&format!("warning: {away}; if the loop broke down there, leave the log out"));
             }
             kept += 1;
             for channel in channels {

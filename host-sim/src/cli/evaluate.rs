@@ -8,7 +8,7 @@ use impromptu_firmware::adapter::Lanes;
 use serde::Serialize;
 
 use super::{
-    Session,
+    Invocation,
     model_file::{ModelFile, method},
     output::{number, table},
     situation::{Situation, milliseconds, speed},
@@ -63,18 +63,18 @@ struct Evaluation {
 }
 
 impl Evaluate {
-    pub(super) fn run(self, session: &Session) -> Result<()> {
+    pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
         let plant = self.situation.plant()?.delayed(self.extra_delay_ms / 1e3);
-        let seed = session.configuration.seed();
+        let seed = invocation.configuration.seed();
         let files = self.model.iter().map(|path| ModelFile::read(path)).collect::<Result<Vec<_>>>()?;
         for file in &files {
             // Before the first flight: a refused file should not cost minutes.
             if let Some(text) = file.mismatch(&file.model()?, &self.situation) {
-                session.console.note(&text);
+                invocation.console.note(&text);
             }
         }
-        session.console.note(&format!("seed {seed}"));
-        let test_seed = session.configuration.seed_of(Purpose::Test);
+        invocation.console.note(&format!("seed {seed}"));
+        let test_seed = invocation.configuration.seed_of(Purpose::Test);
         let mut rows = Vec::new();
         let of = (files.len() * self.speed.len()) as u64;
         for &speed in &self.speed {
@@ -84,12 +84,12 @@ impl Evaluate {
                 let flights = Flights { plant: &plant, trajectories: &trajectories, baseline: &baseline, speed, test_seed, seed };
                 let flights = flights.of(file).with_context(|| file.name())?;
                 rows.extend(summarise(&flights).into_iter().map(|row| ModelRow { model: file.name(), row }));
-                session.console.steps(rows.len() as u64, of);
+                invocation.console.steps(rows.len() as u64, of);
             }
         }
-        session.console.finish();
+        invocation.console.finish();
         let evaluation = Evaluation { seed, strokes: self.strokes, table: rows };
-        session.format.print(&evaluation, || text(&evaluation))
+        invocation.format.print(&evaluation, || text(&evaluation))
     }
 }
 

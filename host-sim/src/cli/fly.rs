@@ -11,7 +11,7 @@ use impromptu_firmware::{
 use serde::Serialize;
 
 use super::{
-    Session,
+    Invocation,
     model_file::{ModelFile, method},
     output::{number, table},
     processor::Flights,
@@ -123,7 +123,7 @@ impl Tripped {
 }
 
 impl Fly {
-    pub(super) fn run(self, session: &Session) -> Result<()> {
+    pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
         let plant = self.situation.plant()?.delayed(self.extra_delay_ms / 1e3);
         let trajectory = match &self.trajectory {
             Some(name) => Some(trajectory::find(name)?.scaled(self.speed).sampled(plant.rate_hz())?),
@@ -134,7 +134,7 @@ impl Fly {
         if let (Some(model), Some(file)) = (&model, &file)
             && let Some(text) = file.mismatch(model, &self.situation)
         {
-            session.console.note(&text);
+            invocation.console.note(&text);
         }
         if let (Some(model), Some(file)) = (&model, &file)
             && self.lanes.lanes().feedback
@@ -143,20 +143,20 @@ impl Fly {
             if self.lanes == LaneChoice::Feedback {
                 bail!("{}: has no feedback lane; give --lanes network", file.name());
             }
-            session.console.note(&format!("{}: has no feedback lane, its network flies alone", file.name()));
+            invocation.console.note(&format!("{}: has no feedback lane, its network flies alone", file.name()));
         }
         if self.pil {
             let strokes =
-                || strokes(session.configuration.seed_of(Purpose::Test), self.strokes as usize, self.speed, plant.rate_hz());
+                || strokes(invocation.configuration.seed_of(Purpose::Test), self.strokes as usize, self.speed, plant.rate_hz());
             let trajectories = trajectory.map_or_else(strokes, |trajectory| Ok(vec![trajectory]))?;
             let (speed, lanes, link) = (self.speed, self.lanes.lanes(), self.link);
             let flights = Flights { plant: &plant, trajectories: &trajectories, speed, file: file.as_ref(), lanes, link };
-            return flights.run(session);
+            return flights.run(invocation);
         }
         let Some(trajectory) = trajectory else { bail!("--trajectory is missing") };
-        let seed = session.configuration.seed();
-        let flight_seed = session.configuration.seed_of(Purpose::Test);
-        session.console.note(&format!("seed {seed}"));
+        let seed = invocation.configuration.seed();
+        let flight_seed = invocation.configuration.seed_of(Purpose::Test);
+        invocation.console.note(&format!("seed {seed}"));
         let baseline = FlightPlan { log: model.is_none(), ..FlightPlan::new(&trajectory, flight_seed) };
         let mut methods = vec![Method::Baseline];
         let mut plans = vec![baseline];
@@ -169,7 +169,7 @@ impl Fly {
             plant.fly(&plans).with_context(|| file.as_ref().map_or_else(|| trajectory.name.clone(), ModelFile::name))?;
         if let Some(path) = &self.log {
             write_log(&records, path)?;
-            session.console.note(&format!("log: {}", path.display()));
+            invocation.console.note(&format!("log: {}", path.display()));
         }
         let baseline = records[0].rms;
         let trajectory = std::slice::from_ref(&trajectory);
@@ -184,7 +184,7 @@ impl Fly {
             trips: records.last().and_then(|record| Tripped::of(&record.trips)),
             log: self.log,
         };
-        session.format.print(&flown, || text(&flown))
+        invocation.format.print(&flown, || text(&flown))
     }
 }
 

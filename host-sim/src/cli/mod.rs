@@ -109,7 +109,7 @@ enum Command {
 }
 
 /// What a command is given beside its own arguments.
-struct Session {
+struct Invocation {
     configuration: Configuration,
     format: Format,
     console: Console,
@@ -168,17 +168,17 @@ fn repeated(words: &[OsString]) -> String {
 fn execute(arguments: Arguments, console: &Console, command: String) -> Result<()> {
     let Global { config, seed, out, format, .. } = arguments.global;
     let configuration = Configuration::load(config.as_deref(), seed, out)?;
-    let session = Session { configuration, format, console: console.clone(), command };
+    let invocation = Invocation { configuration, format, console: console.clone(), command };
     match arguments.command {
-        None => demo::run(&session),
-        Some(Command::Collect(command)) => command.run(&session),
-        Some(Command::Diagnose(command)) => command.run(&session),
-        Some(Command::Train(command)) => command.run(&session),
-        Some(Command::Fly(command)) => command.run(&session),
-        Some(Command::Evaluate(command)) => command.run(&session),
-        Some(Command::Report(command)) => command.run(&session),
-        Some(Command::Study(command)) => command.run(&session),
-        Some(Command::Trajectory(command)) => command.run(&session),
+        None => demo::run(&invocation),
+        Some(Command::Collect(command)) => command.run(&invocation),
+        Some(Command::Diagnose(command)) => command.run(&invocation),
+        Some(Command::Train(command)) => command.run(&invocation),
+        Some(Command::Fly(command)) => command.run(&invocation),
+        Some(Command::Evaluate(command)) => command.run(&invocation),
+        Some(Command::Report(command)) => command.run(&invocation),
+        Some(Command::Study(command)) => command.run(&invocation),
+        Some(Command::Trajectory(command)) => command.run(&invocation),
     }
 }
 

@@ -5,7 +5,7 @@ use impromptu_firmware::adapter::Lanes;
 use serde::Serialize;
 
 use super::{
-    Session,
+    Invocation,
     model_file::{ModelFile, method},
     output::{number, table},
 };
@@ -43,12 +43,12 @@ struct Flown {
 
 impl Flights<'_> {
     /// Flies the baseline and, if there is one, the model over the trajectories, and prints the same table as the software would.
-    pub(super) fn run(&self, session: &Session) -> Result<()> {
+    pub(super) fn run(&self, invocation: &Invocation) -> Result<()> {
         if self.plant.condition.command_delay_s > 0.0 {
             bail!("--pil: the firmware has no further delay to offer; leave out --extra-delay-ms");
         }
-        let (seed, flight_seed) = (session.configuration.seed(), session.configuration.seed_of(Purpose::Test));
-        session.console.note(&format!("seed {seed}; building the firmware"));
+        let (seed, flight_seed) = (invocation.configuration.seed(), invocation.configuration.seed_of(Purpose::Test));
+        invocation.console.note(&format!("seed {seed}; building the firmware"));
         let model = self.file.map(ModelFile::model).transpose()?;
         let (_emulated, mut board) = pil::start(self.file.map(ModelFile::bytes), self.link, SHIFT)?;
         let (flies, wanted) = (board.introduce()?, model.as_ref().map(|model| model.checksum()));
@@ -62,10 +62,10 @@ impl Flights<'_> {
             plans.extend(seeds().map(|(trajectory, seed)| FlightPlan::new(trajectory, seed).with(model, self.lanes)));
         }
         let of = plans.len() as u64;
-        let flown = |done: usize| session.console.steps(done as u64, of);
+        let flown = |done: usize| invocation.console.steps(done as u64, of);
         let (records, pil) = pil::fly(&mut board, self.plant, &plans, flown).context("--pil")?;
         board.end();
-        session.console.finish();
+        invocation.console.finish();
         let errors: Vec<f64> = records.iter().map(|record| record.rms).collect();
         let (baseline, with_model) = errors.split_at(flights);
         let scored = |method, errors: &[f64]| -> Vec<PerFlight> {
@@ -83,7 +83,7 @@ impl Flights<'_> {
             table: summarise(&per_flight),
             pil,
         };
-        session.format.print(&flown, || text(&flown))
+        invocation.format.print(&flown, || text(&flown))
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context as _, Result};
 use clap::Args;
 
-use super::{Session, demo};
+use super::{Invocation, demo};
 use crate::report::Results;
 
 /// Arguments of `report`.
@@ -22,10 +22,10 @@ pub(super) struct Report {
 }
 
 impl Report {
-    pub(super) fn run(self, session: &Session) -> Result<()> {
+    pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
         let name = self.results.display();
         let text = std::fs::read_to_string(&self.results).with_context(|| name.to_string())?;
         let results = Results::from_json(&text).with_context(|| name.to_string())?;
-        demo::show(session, &results, &session.configuration.folder()?)
+        demo::show(invocation, &results, &invocation.configuration.folder()?)
     }
 }

@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::{Args, Subcommand};
 
 use super::{
-    Session,
+    Invocation,
     output::{table, table_of},
 };
 use crate::{
@@ -44,18 +44,18 @@ enum Subject {
 }
 
 impl Study {
-    pub(super) fn run(self, session: &Session) -> Result<()> {
+    pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
         match self.subject {
-            Subject::Lti(lti) => lti.run(session),
+            Subject::Lti(lti) => lti.run(invocation),
             Subject::Quadrotor { quick } => {
                 let settings = if quick { QuadrotorSettings::quick() } else { QuadrotorSettings::default() };
-                let settings = QuadrotorSettings { seed: session.configuration.seed(), ..settings };
-                let found = quadrotor::run(&settings, &session.command, &|text| session.console.note(text))?;
-                show(session, "quadrotor", &found)
+                let settings = QuadrotorSettings { seed: invocation.configuration.seed(), ..settings };
+                let found = quadrotor::run(&settings, &invocation.command, &|text| invocation.console.note(text))?;
+                show(invocation, "quadrotor", &found)
             }
-            Subject::Robustness(command) => command.run(session),
-            Subject::Draws(command) => command.run(session),
-            Subject::Merge(command) => command.run(session),
+            Subject::Robustness(command) => command.run(invocation),
+            Subject::Draws(command) => command.run(invocation),
+            Subject::Merge(command) => command.run(invocation),
         }
     }
 }
@@ -75,23 +75,23 @@ struct Lti {
 }
 
 impl Lti {
-    fn run(self, session: &Session) -> Result<()> {
+    fn run(self, invocation: &Invocation) -> Result<()> {
         let mut settings = study::lti::Settings::default();
-        settings.learning.seed = session.configuration.seed();
+        settings.learning.seed = invocation.configuration.seed();
         settings.learning.restarts = self.restarts;
         settings.learning.training.iterations = self.iterations;
         let mut study = study::lti::run(&settings)?;
-        study::extensions::add(&mut study, session.configuration.seed(), self.logs.as_deref())?;
-        show(session, "lti", &study)
+        study::extensions::add(&mut study, invocation.configuration.seed(), self.logs.as_deref())?;
+        show(invocation, "lti", &study)
     }
 }
 
 /// Writes the page into the folder as `study-NAME.html` and prints what was found.
-fn show(session: &Session, name: &str, study: &study::Study) -> Result<()> {
-    let path = session.configuration.folder()?.join(format!("study-{name}.html"));
+fn show(invocation: &Invocation, name: &str, study: &study::Study) -> Result<()> {
+    let path = invocation.configuration.folder()?.join(format!("study-{name}.html"));
     write_page(&render_study(study)?, &path)?;
-    session.console.note(&format!("report: {}", path.display()));
-    session.format.print(study, || text(study))
+    invocation.console.note(&format!("report: {}", path.display()));
+    invocation.format.print(study, || text(study))
 }
 
 /// Section by section: its tables, then what stands in none.

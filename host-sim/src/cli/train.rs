@@ -16,7 +16,7 @@ use impromptu_model_export::{
 use serde::Serialize;
 
 use super::{
-    Session,
+    Invocation,
     configuration::checked,
     output::table,
     situation::{milliseconds, plant},
@@ -107,11 +107,11 @@ struct Origin {
 }
 
 impl Train {
-    pub(super) fn run(self, session: &Session) -> Result<()> {
-        let seed = session.configuration.seed();
+    pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
+        let seed = invocation.configuration.seed();
         let mut recipe: Recipe = match &self.recipe {
             Some(path) => checked(path).context("--recipe")?,
-            None => session.configuration.recipe().clone(),
+            None => invocation.configuration.recipe().clone(),
         };
         (recipe.network.seed, recipe.fine_tuning.seed) = (seed, seed);
         let origin = self.origin(&recipe)?;
@@ -119,11 +119,11 @@ impl Train {
         let read = |paths: &[PathBuf]| paths.iter().map(|path| FlightLog::read(path, rate_hz)).collect::<Result<Vec<_>, _>>();
         let (logs, dithered) = (read(&self.log)?, read(&self.dithered)?);
         check_movement(&logs)?;
-        session.console.note(&format!("seed {seed}"));
-        let gates = self.pass_gates(session, &logs, origin.delay_s, seed)?;
-        let folder = session.configuration.folder()?;
+        invocation.console.note(&format!("seed {seed}"));
+        let gates = self.pass_gates(invocation, &logs, origin.delay_s, seed)?;
+        let folder = invocation.configuration.folder()?;
 
-        session.console.stage(&format!("training on {} logs", logs.len()));
+        invocation.console.stage(&format!("training on {} logs", logs.len()));
         let validation = match &origin.plant {
             Some(plant) => validation_strokes(&recipe, &recipe.validation_speeds, plant.rate_hz(), seed)?,
             None => Vec::new(),
@@ -136,25 +136,25 @@ impl Train {
             }
         });
         let judge = in_flight.as_ref().map(|judge| judge as &Judge<'_>);
-        let learned = learn(&recipe, &logs, origin.delay_s, origin.smoothing_s, judge, &mut watched(session, &recipe))?;
-        session.console.finish();
+        let learned = learn(&recipe, &logs, origin.delay_s, origin.smoothing_s, judge, &mut watched(invocation, &recipe))?;
+        invocation.console.finish();
         for log in &learned.broken {
             let error = log.largest_error;
-            session.console.note(&format!("{}: left out, its loop broke down (largest error {error:.2} m)", log.name));
+            invocation.console.note(&format!("{}: left out, its loop broke down (largest error {error:.2} m)", log.name));
         }
         let describe = |lane: Option<&LaneDescription>, remarks: &str| {
             describe_model(&self.name, &recipe, &origin, &learned, lane, remarks, seed)
         };
-        session.console.stage("designing the feedback lane");
+        invocation.console.stage("designing the feedback lane");
         let identification = if dithered.is_empty() { &logs } else { &dithered };
-        let lane = feedback::choose(session, &recipe, origin.plant.as_ref(), identification, &validation, &|lane| {
+        let lane = feedback::choose(invocation, &recipe, origin.plant.as_ref(), identification, &validation, &|lane| {
             encode(&describe(Some(lane), ""), Some(&learned.quantised), Precision::Int8, &learned.rows.calibration)
         });
         let (mut remarks, design, refusal) = match &lane {
             Ok(choice) => (format!("feedback lane: {}", choice.design), Some(choice.design.clone()), None),
             Err(reason) => (format!("no feedback lane: {reason}"), None, Some(reason.clone())),
         };
-        session.console.note(&remarks);
+        invocation.console.note(&remarks);
         if let Some(overridden) = &gates.overridden {
             remarks = format!("{remarks}; {overridden}");
         }
@@ -181,22 +181,22 @@ impl Train {
             overridden: gates.overridden,
             files,
         };
-        session.format.print(&trained, || text(&trained))
+        invocation.format.print(&trained, || text(&trained))
     }
 
     /// The gates of `diagnose`: the recipe's features are relative to now, so the gain has to be one as well.
-    fn pass_gates(&self, session: &Session, logs: &[FlightLog], delay_s: f64, seed: u64) -> Result<Passed> {
+    fn pass_gates(&self, invocation: &Invocation, logs: &[FlightLog], delay_s: f64, seed: u64) -> Result<Passed> {
         let axes = check_gates(logs, delay_s, seed);
         let failures: Vec<String> = axes.iter().flat_map(AxisGates::failures).collect();
         for warning in axes.iter().flat_map(AxisGates::warnings) {
-            session.console.note(&format!("warning: {warning}"));
+            invocation.console.note(&format!("warning: {warning}"));
         }
         let overridden = (!failures.is_empty()).then(|| format!("gates overridden by --force: {}", failures.join("; ")));
         if let Some(overridden) = &overridden {
             if !self.force {
                 bail!("--log: {}; `host-sim diagnose` says more, --force trains all the same", failures.join("; "));
             }
-            session.console.note(&format!("warning: {overridden}"));
+            invocation.console.note(&format!("warning: {overridden}"));
         }
         Ok(Passed { axes, overridden })
     }
@@ -239,12 +239,12 @@ fn check_movement(logs: &[FlightLog]) -> Result<()> {
 }
 
 /// Passes epochs on; all trainings are one count.
-fn watched<'a>(session: &'a Session, recipe: &Recipe) -> impl FnMut(Progress) + use<'a> {
+fn watched<'a>(invocation: &'a Invocation, recipe: &Recipe) -> impl FnMut(Progress) + use<'a> {
     let of = (recipe.network.epochs * recipe.weight_decays.len() + recipe.fine_tuning.epochs) as u64;
     let mut done = 0;
     move |progress: Progress| {
         done += u64::from(progress.epoch > 0);
-        session.console.steps(done, of);
+        invocation.console.steps(done, of);
     }
 }
 

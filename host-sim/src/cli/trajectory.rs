@@ -8,7 +8,7 @@ use std::{
 use anyhow::Result;
 use clap::Args;
 
-use super::{Session, output, situation::speed};
+use super::{Invocation, output, situation::speed};
 use crate::trajectory::{DEFAULT_RATE_HZ, KNOWN_NAMES, Motion, by_name, load};
 
 /// Arguments of `trajectory`.
@@ -37,9 +37,9 @@ pub(super) struct TrajectoryCommand {
 }
 
 impl TrajectoryCommand {
-    pub(super) fn run(self, session: &Session) -> Result<()> {
+    pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
         let Some(name) = self.trajectory else {
-            return session.format.print(&KNOWN_NAMES, || KNOWN_NAMES.join("\n") + "\n");
+            return invocation.format.print(&KNOWN_NAMES, || KNOWN_NAMES.join("\n") + "\n");
         };
         let trajectory = find(&name)?.scaled(self.speed).sampled(DEFAULT_RATE_HZ)?;
         let mut text = String::from("t,x,y,z,yaw\n");
@@ -47,7 +47,7 @@ impl TrajectoryCommand {
             let [x, y, z] = sample.position;
             writeln!(text, "{},{x},{y},{z},{}", tick as f64 / trajectory.rate_hz, sample.yaw)?;
         }
-        session.console.note(&format!(
+        invocation.console.note(&format!(
             "{}: {:.1} s, at most {:.2} m/s and {:.2} m/s^2",
             trajectory.name,
             trajectory.drawn_seconds(),

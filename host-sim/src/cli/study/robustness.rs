@@ -9,7 +9,7 @@ use impromptu_firmware::model::Model;
 use super::show;
 use crate::{
     cli::{
-        Session, configuration,
+        Invocation, configuration,
         model_file::ModelFile,
         output::write,
         situation::{Situation, plant},
@@ -79,7 +79,7 @@ impl Drawn {
 }
 
 impl Robustness {
-    pub(super) fn run(self, session: &Session) -> Result<()> {
+    pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
         let mut loops = Vec::new();
         for vehicle in &self.vehicle {
             for condition in &self.condition {
@@ -87,18 +87,18 @@ impl Robustness {
             }
         }
         let settings = Settings {
-            seed: session.configuration.seed(),
+            seed: invocation.configuration.seed(),
             loops,
             strokes: self.strokes as usize,
             draws: self.draw.draws,
             draw_strokes: self.draw.draw_strokes as usize,
             ranges: self.draw.ranges()?,
-            recipe: session.configuration.recipe().clone(),
-            out: session.configuration.folder()?,
+            recipe: invocation.configuration.recipe().clone(),
+            out: invocation.configuration.folder()?,
         };
-        let study = run(&settings, &session.command, &session.console)?;
-        session.console.finish();
-        show(session, "robustness", &study)
+        let study = run(&settings, &invocation.command, &invocation.console)?;
+        invocation.console.finish();
+        show(invocation, "robustness", &study)
     }
 }
 
@@ -124,12 +124,12 @@ pub(super) struct Draws {
 }
 
 impl Draws {
-    pub(super) fn run(self, session: &Session) -> Result<()> {
+    pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
         let (plant, ranges) = (self.situation.plant()?, self.draw.ranges()?);
-        let seed = session.configuration.seed();
+        let seed = invocation.configuration.seed();
         let bytes = match &self.model {
             Some(path) => ModelFile::read(path)?.bytes().to_vec(),
-            None => build(session.configuration.recipe(), &plant, seed, &mut |_| {})?.models.int8,
+            None => build(invocation.configuration.recipe(), &plant, seed, &mut |_| {})?.models.int8,
         };
         let model = Model::from_bytes(&bytes).with_context(|| match &self.model {
             Some(path) => format!("{}: refused", path.display()),
@@ -140,15 +140,15 @@ impl Draws {
             Shard::WHOLE => format!("draws-{}", slug(&settings.nominal)),
             Shard { part, of } => format!("draws-{}-{part}-of-{of}", slug(&settings.nominal)),
         };
-        let path = session.configuration.folder()?.join(&name).with_extension("jsonl");
+        let path = invocation.configuration.folder()?.join(&name).with_extension("jsonl");
         let header = Header { settings, shard: self.shard };
-        let console = &session.console;
+        let console = &invocation.console;
         let content = fly_draws(&header, &plant, &model, &path, &|done, of| console.steps(done, of))?;
         console.finish();
         console.note(&format!("{}: {} draws, seed {seed}", path.display(), content.draws.len()));
-        let mut study = Study::new("Monte Carlo over vehicles", &session.command, seed);
+        let mut study = Study::new("Monte Carlo over vehicles", &invocation.command, seed);
         spread::tell(&mut study, &slug(&header.settings.nominal), &content);
-        show(session, &name, &study)
+        show(invocation, &name, &study)
     }
 }
 
@@ -163,15 +163,15 @@ pub(super) struct Merge {
 }
 
 impl Merge {
-    pub(super) fn run(self, session: &Session) -> Result<()> {
+    pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
         let (bytes, content) = merge(&self.files)?;
         let settings = &content.header.settings;
         let name = format!("draws-{}", slug(&settings.nominal));
-        let path = session.configuration.folder()?.join(&name).with_extension("jsonl");
+        let path = invocation.configuration.folder()?.join(&name).with_extension("jsonl");
         write(&path, &bytes)?;
-        session.console.note(&format!("{}: {} draws, seed {}", path.display(), content.draws.len(), settings.seed));
-        let mut study = Study::new("Monte Carlo over vehicles", &session.command, settings.seed);
+        invocation.console.note(&format!("{}: {} draws, seed {}", path.display(), content.draws.len(), settings.seed));
+        let mut study = Study::new("Monte Carlo over vehicles", &invocation.command, settings.seed);
         spread::tell(&mut study, &slug(&settings.nominal), &content);
-        show(session, &name, &study)
+        show(invocation, &name, &study)
     }
 }

@@ -2,7 +2,7 @@
 
 use impromptu_model_export::{ExportError, description::LaneDescription};
 
-use super::super::Session;
+use super::super::Invocation;
 use crate::{
     experiment::{LaneChoice, Loop, Purpose, Recipe, choose_lane},
     flight_log::FlightLog,
@@ -11,7 +11,7 @@ use crate::{
 
 /// Designs lanes from `logs` and chooses one by flights of `plant` over the `validation` trajectories, or says why there is none.
 pub(super) fn choose(
-    session: &Session,
+    invocation: &Invocation,
     recipe: &Recipe,
     plant: Option<&Loop>,
     logs: &[FlightLog],
@@ -21,6 +21,6 @@ pub(super) fn choose(
     let Some(plant) = plant else {
         return Err("it is chosen by simulated flights, and no vehicle was given; give --vehicle".into());
     };
-    let flight_seed = session.configuration.seed_of(Purpose::Validation);
+    let flight_seed = invocation.configuration.seed_of(Purpose::Validation);
     choose_lane(recipe, plant, logs, validation, flight_seed, encode).map_err(|reason| reason.to_string())
 }
