@@ -19,7 +19,7 @@ fn main() {
             println!(
                 "{name}, {features:<17} {:>2} restarts {seconds:6.2} s, {:>3} steps of the chosen one, f32 kernel's error {:.1e}",
                 settings.restarts,
-                learned.fit.progress.len().saturating_sub(1),
+                learned.fit.steps(),
                 learned.held_out
             );
         }

@@ -175,8 +175,7 @@ pub fn assess(record: &Record, settings: &Settings) -> Result<Assessment, Diagno
     };
     let record = record.slower(divisor).shorter(MOST_SAMPLES);
     let sub_rate_hz = rate_hz / divisor as f64;
-    let shortest = record.segments.iter().map(|segment| segment.reference.len()).min().unwrap_or(0);
-    if record.len() < FEWEST_ROWS || shortest < FEWEST_ROWS / 2 {
+    if record.len() < FEWEST_ROWS || record.shortest() < FEWEST_ROWS / 2 {
         return Err(DiagnosisError::Short { rows: record.len(), sub_rate_hz, needed: FEWEST_ROWS });
     }
     let order = excitation::order_of_excitation(&record);
@@ -189,7 +188,8 @@ pub fn assess(record: &Record, settings: &Settings) -> Result<Assessment, Diagno
     let identified = identify(&record).ok_or(DiagnosisError::Unexplained { percent: 0.0 })?;
     let mut random = Xoshiro256PlusPlus::seed_from_u64(settings.seed);
     let draws = identified.draws(&record, settings.draws, &mut random);
-    let mut properties = Properties::of(&identified, &draws, &record);
+    let lowest_hz = excitation::lowest(&record);
+    let mut properties = Properties::of(&identified, &draws, &record, lowest_hz);
     if properties.explained < LEAST_EXPLAINED {
         return Err(DiagnosisError::Unexplained { percent: 100.0 * properties.explained });
     }
@@ -200,7 +200,7 @@ pub fn assess(record: &Record, settings: &Settings) -> Result<Assessment, Diagno
     }
     // The mean before decimation leaves zeros at half the sub-rate that are its own, not the loop's.
     let trusted_hz = if divisor > 1 { 0.25 * sub_rate_hz } else { 0.5 * sub_rate_hz };
-    let coverage = excitation::coverage(&record, properties.bandwidth_hz.value, trusted_hz);
+    let coverage = excitation::coverage(&record, properties.bandwidth_hz.value, lowest_hz, trusted_hz);
     let gates = Gates::of(&properties, &coverage);
     Ok(Assessment { rate_hz, sub_rate_hz, identified, draws, properties, coverage, gates, record })
 }

@@ -87,8 +87,7 @@ impl Spectra {
 
 /// Length of Welch's windows: eight of them, or more, overlapping.
 fn window(record: &Record) -> usize {
-    let longest = record.segments.iter().map(|segment| segment.reference.len()).max().unwrap_or(0);
-    (longest / 5).clamp(16, 512) & !1
+    (record.longest() / 5).clamp(16, 512) & !1
 }
 
 /// Whether a line is the reference's work rather than the noise's.
@@ -117,14 +116,13 @@ const SLOW_SHARE: f64 = 0.05;
 
 /// Lowest frequency that the reference shows, Hz (see [`Coverage::lowest_hz`]); 0 if stretches at different heights show the rest itself.
 pub fn lowest(record: &Record) -> f64 {
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
     let all: Vec<f64> = record.segments.iter().flat_map(|segment| segment.reference.iter().copied()).collect();
     let middle = mean(&all);
     let wanted = SLOW_SHARE * all.iter().map(|value| (value - middle).powi(2)).sum::<f64>();
     let still = |segment: &Segment| segment.reference.len() as f64 * (mean(&segment.reference) - middle).powi(2);
     let mut seen: f64 = record.segments.iter().map(still).sum();
     // Line by line of the longest stretch, all stretches at the same frequencies: the low lines are few, so no fast transform.
-    let longest = record.segments.iter().map(|segment| segment.reference.len()).max().unwrap_or(0);
+    let longest = record.longest();
     let mut line = 0;
     while seen < wanted && 2 * line < longest {
         line += 1;
@@ -133,9 +131,13 @@ pub fn lowest(record: &Record) -> f64 {
     line as f64 / (longest.max(1) as f64 * record.period_s)
 }
 
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
 /// Variance of a stretch that one line, in cycles a sample, holds, times the samples.
 fn power(values: &[f64], line: f64) -> f64 {
-    let middle = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let middle = mean(values);
     let turn = Complex::from_polar(1.0, -std::f64::consts::TAU * line);
     let mut phase = Complex::new(1.0f64, 0.0);
     let mut sum = Complex::new(0.0, 0.0);
@@ -146,8 +148,9 @@ fn power(values: &[f64], line: f64) -> f64 {
     2.0 * sum.norm_sqr() / values.len().max(1) as f64
 }
 
-/// What the record shows of a loop with that bandwidth, Hz; nothing above `trusted_hz` counts.
-pub fn coverage(record: &Record, bandwidth_hz: f64, trusted_hz: f64) -> Coverage {
+/// What the record shows of a loop with that bandwidth, Hz; nothing above `trusted_hz` counts, and `lowest_hz` is
+/// that of [`lowest`].
+pub fn coverage(record: &Record, bandwidth_hz: f64, lowest_hz: f64, trusted_hz: f64) -> Coverage {
     let spectra = Spectra::new(record, window(record));
     let inside = ((bandwidth_hz.min(trusted_hz) / spectra.spacing_hz) as usize).clamp(1, spectra.lines.len());
     let seen = spectra.lines[..inside].iter().filter(|line| coherent(line)).count();
@@ -155,7 +158,7 @@ pub fn coverage(record: &Record, bandwidth_hz: f64, trusted_hz: f64) -> Coverage
     Coverage {
         share: seen as f64 / inside as f64,
         highest_hz: (highest as f64 * spectra.spacing_hz).min(trusted_hz),
-        lowest_hz: lowest(record),
+        lowest_hz,
         order: order_of_excitation(record),
     }
 }

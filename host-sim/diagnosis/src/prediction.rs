@@ -103,6 +103,7 @@ pub fn predict(
     // axes), the add-on's references, which move more, bring it a second time.
     let twice = |error: f64| error.hypot(AGAIN * floor);
     let wider = |end: f64| end + (end - found.value) * WIDENING + (end - found.value).signum() * LEAST_WIDENING;
+    let least = wider(found.low).min(found.value - LEAST_WIDENING);
     let with_add_on = Interval::of(error, outcomes.iter().map(|outcome| outcome.1));
     Some(Prediction {
         window,
@@ -110,7 +111,7 @@ pub fn predict(
         baseline: Interval::of(baseline, outcomes.iter().map(|outcome| outcome.0)),
         with_add_on: Interval { high: twice(with_add_on.high), ..with_add_on },
         reduction_percent: Interval {
-            low: 100.0 * (1.0 - twice((1.0 - wider(found.low).min(found.value - LEAST_WIDENING) / 100.0) * baseline) / baseline),
+            low: reduction(&(baseline, twice((1.0 - least / 100.0) * baseline))),
             value: found.value,
             high: wider(found.high).max(found.value + LEAST_WIDENING).min(100.0),
         },
@@ -136,8 +137,8 @@ pub fn root_mean_square(errors: impl IntoIterator<Item = f64>) -> f64 {
 
 impl<'a> Bench<'a> {
     fn new(record: &'a Record, identified: &'a Identified) -> Self {
-        let shortest = record.segments.iter().map(|segment| segment.reference.len()).min().unwrap_or(0);
-        Self { record, noise: &identified.noise, skipped: identified.model.settling().clamp(10, 40).min(shortest / 8) }
+        let skipped = identified.model.settling().clamp(10, 40).min(record.shortest() / 8);
+        Self { record, noise: &identified.noise, skipped }
     }
 
     /// Trains on one simulated log and flies along others: RMS errors of the baseline and with the add-on.

@@ -6,7 +6,7 @@
 use nalgebra::DVector;
 use serde::Serialize;
 
-use crate::{excitation::lowest, identification::Identified, record::Record, transfer_function::TransferFunction};
+use crate::{identification::Identified, record::Record, transfer_function::TransferFunction};
 
 /// A value with the interval that holds it with 95 % of the draws' weight.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -113,8 +113,9 @@ const LEAST_REVERSAL: f64 = 0.02;
 const HORIZON: usize = 400;
 
 impl Properties {
-    /// Properties of a model that was identified from the record; `draws` are other models that could be the true one.
-    pub fn of(identified: &Identified, draws: &[TransferFunction], record: &Record) -> Self {
+    /// Properties of a model that was identified from the record, which shows nothing below `lowest_hz`; `draws` are other models that
+    /// could be the true one.
+    pub fn of(identified: &Identified, draws: &[TransferFunction], record: &Record, lowest_hz: f64) -> Self {
         let period_s = record.period_s;
         let model = &identified.model;
         let over = |property: &dyn Fn(&TransferFunction) -> f64| Interval::of(property(model), draws.iter().map(property));
@@ -128,7 +129,7 @@ impl Properties {
         Self {
             strict_degree: strict(identified),
             practical_degree: degree(&|model| model.first_above(THRESHOLD, horizon)),
-            gain: gain(identified, record),
+            gain: gain(identified, lowest_hz * std::f64::consts::TAU * period_s),
             offset: over(&|model| model.offset),
             reversal: over(&reversals),
             reversal_ticks: reversal(model, horizon).1,
@@ -143,8 +144,8 @@ impl Properties {
 }
 
 /// The gain, and 95 % of it by the coefficients' covariance, linearised: draws of coefficients whose poles nearly cancel zeros leave the
-/// valley in which the data hold them, and their gains with it.
-fn gain(identified: &Identified, record: &Record) -> Interval {
+/// valley in which the data hold them, and their gains with it. Below `angle`, in radians a sample, the record shows nothing.
+fn gain(identified: &Identified, angle: f64) -> Interval {
     let Identified { model, covariance, .. } = identified;
     let value = model.gain();
     let sum: f64 = model.denominator.iter().sum();
@@ -154,9 +155,8 @@ fn gain(identified: &Identified, record: &Record) -> Interval {
         _ if index < terms + order => -value / sum,
         _ => 0.0,
     });
-    let reach = 1.96 * slope.dot(&(covariance * &slope)).max(0.0).sqrt();
-    let angle = lowest(record) * std::f64::consts::TAU * record.period_s;
-    let reach = reach + coloured(&identified.noise) * (model.response(angle).norm() - value.abs()).abs();
+    let extrapolated = coloured(&identified.noise) * (model.response(angle).norm() - value.abs()).abs();
+    let reach = 1.96 * slope.dot(&(covariance * &slope)).max(0.0).sqrt() + extrapolated;
     Interval { low: value - reach, value, high: value + reach }
 }
 

@@ -140,6 +140,16 @@ impl Record {
         self.segments.iter().map(|segment| segment.reference.len()).sum()
     }
 
+    /// Samples of the shortest stretch.
+    pub fn shortest(&self) -> usize {
+        self.segments.iter().map(|segment| segment.reference.len()).min().unwrap_or(0)
+    }
+
+    /// Samples of the longest stretch.
+    pub fn longest(&self) -> usize {
+        self.segments.iter().map(|segment| segment.reference.len()).max().unwrap_or(0)
+    }
+
     /// Whether there is no sample.
     pub fn is_empty(&self) -> bool {
         self.len() == 0

@@ -54,6 +54,11 @@ impl Fit {
     pub fn rms(&self) -> f64 {
         self.progress.last().copied().unwrap_or(f64::INFINITY)
     }
+
+    /// Steps that were taken.
+    pub fn steps(&self) -> usize {
+        self.progress.len().saturating_sub(1)
+    }
 }
 
 /// Rows in the network's scale.

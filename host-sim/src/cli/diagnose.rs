@@ -160,8 +160,8 @@ impl Diagnose {
         invocation.format.print(&diagnosed, || text(&diagnosed))
     }
 
-    /// How many logs are used, and their channels, those of one name joined. Flights in which the loop broke down are left out, as `train` does; of other loops
-    /// nobody knows the scale of their errors, so that such a log is only named.
+    /// How many logs are used, and their channels, those of one name joined. Flights in which the loop broke down are left out, as `train`
+    /// does; of other loops nobody knows the scale of their errors, so that such a log is only named.
     fn channels(&self, invocation: &Invocation) -> Result<(usize, Vec<Channel>)> {
         let age_s = self.delay_ms.unwrap_or(0.0) / 1e3;
         let columns = self.columns.as_ref().map(|columns| &columns.0);
@@ -171,10 +171,9 @@ impl Diagnose {
         let bound = largest_sound_error(&errors);
         let (mut kept, mut joined): (usize, Vec<Channel>) = (0, Vec::new());
         for ((path, channels), error) in files.into_iter().zip(errors) {
-            let flight = channels.iter().all(|channel| AXES.contains(&channel.name.as_str()));
             if error > bound {
                 let away = format!("{path}: up to {error:.3} from the reference, beside {bound:.3} in a usual log at most");
-                if flight {
+                if channels.iter().all(|channel| AXES.contains(&channel.name.as_str())) {
                     invocation.console.note(&format!("{away}: the loop broke down; left out"));
                     continue;
                 }

@@ -8,6 +8,7 @@ use impromptu_lti::extensions::{
     mean_and_worst,
 };
 
+use super::summary;
 use crate::{
     report::{Axis, Curve, Figure},
     study::{Finding, Study},
@@ -75,8 +76,8 @@ pub(super) fn add(study: &mut Study, folder: Option<&Path>) -> Result<()> {
     let count = predictions.len() as f64;
     study.find(Finding::new(SECTION, "logs_flights", &[], "flights predicted, each from other families", count, ""));
     let mut find = |name: &str, what: &str, of: &dyn Fn(&Prediction) -> f64| {
-        let (mean, worst) = mean_and_worst(predictions.iter().map(|prediction| 100.0 * of(prediction)));
-        for (suffix, of, value) in [("", "mean of the flights", mean), ("_worst", "worst flight", worst)] {
+        let errors = predictions.iter().map(|prediction| 100.0 * of(prediction));
+        for (suffix, of, value) in summary(errors, "mean of the flights", "worst flight") {
             let found = Finding::new(SECTION, &format!("logs_{name}{suffix}"), &[], &format!("{what}, {of}"), value, "cm");
             study.find(found.cell("RMS error", what, of));
         }

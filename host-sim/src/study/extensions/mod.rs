@@ -10,7 +10,7 @@ mod regions;
 
 use std::path::Path;
 
-use impromptu_lti::levenberg_marquardt::Settings;
+use impromptu_lti::{extensions::mean_and_worst, levenberg_marquardt::Settings};
 
 use super::Study;
 
@@ -21,6 +21,16 @@ pub const ROWS: &[u8] = &[5, 11, 31];
 const TRAINING: fn(usize, usize) -> Settings = |units, iterations| Settings { units, iterations, ..Settings::default() };
 /// Random trajectories in each trial.
 const OTHERS: u64 = 8;
+
+/// Mean and worst of errors, each with what it adds to a number's name and what it is called.
+fn summary(
+    errors: impl IntoIterator<Item = f64>,
+    mean: &'static str,
+    worst: &'static str,
+) -> [(&'static str, &'static str, f64); 2] {
+    let values = mean_and_worst(errors);
+    [("", mean, values.0), ("_worst", worst, values.1)]
+}
 
 /// Adds all of it; flights come from `logs` (CSV), or from the copies in the program.
 ///

@@ -5,6 +5,7 @@ use impromptu_lti::{
     levenberg_marquardt::Settings,
 };
 
+use super::summary;
 use crate::study::{Asked, Finding, Study};
 
 const SECTION: &str = "A nonlinear plant with a known law";
@@ -19,8 +20,7 @@ pub(super) fn add(study: &mut Study, settings: &Settings, others: u64, seed: u64
          test trajectory and random ones; the last number of each kind is the worst trajectory's.",
     );
     let mut find = |name: &str, what: &str, errors: Vec<f64>| {
-        let (mean, worst) = mean_and_worst(errors);
-        for (suffix, of, value) in [("", "mean", mean), ("_worst", "worst", worst)] {
+        for (suffix, of, value) in summary(errors, "mean", "worst") {
             let found = Finding::new(SECTION, &format!("nonlinear_{name}{suffix}"), &[5], &format!("{what}, {of}"), value, "");
             study.find(found.cell(TABLE, what, of));
         }

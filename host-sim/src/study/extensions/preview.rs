@@ -9,6 +9,7 @@ use impromptu_lti::{
     fixtures,
 };
 
+use super::summary;
 use crate::{
     report::{Axis, Curve, Figure},
     study::{Asked, Finding, Study},
@@ -52,8 +53,7 @@ pub(super) fn add(study: &mut Study, each: u64, seed: u64) -> anyhow::Result<()>
             ("learned", &learned),
             ("unprepared", &unprepared),
         ] {
-            let (mean, worst) = mean_and_worst(of_kind(&signals, scheme, kind));
-            for (suffix, of, value) in [("", "mean", mean), ("_worst", "worst", worst)] {
+            for (suffix, of, value) in summary(of_kind(&signals, scheme, kind), "mean", "worst") {
                 let text = format!("{kind}: {}, RMS, {of}", scheme.name);
                 let found = Finding::new(SECTION, &format!("{key}_{name}{suffix}"), &[31], &text, value, "");
                 study.find(found.cell(&format!("RMS of y - y_d, {of} signal of a kind"), kind, &scheme.name));
@@ -61,21 +61,20 @@ pub(super) fn add(study: &mut Study, each: u64, seed: u64) -> anyhow::Result<()>
         }
     }
     let against = |scheme: &Scheme, baselines: &[&Scheme]| {
-        let reductions = (0..signals.len()).map(|index| {
+        // The worst reduction is the least one.
+        let losses = (0..signals.len()).map(|index| {
             let baseline = baselines.iter().map(|baseline| baseline.errors[index]).fold(f64::INFINITY, f64::min);
-            100.0 * (1.0 - scheme.errors[index] / baseline)
+            -100.0 * (1.0 - scheme.errors[index] / baseline)
         });
-        let (mean, worst) = mean_and_worst(reductions.map(|reduction| -reduction));
-        [-mean, -worst]
+        summary(losses, "mean", "worst signal").map(|(suffix, of, loss)| (suffix, of, -loss))
     };
     for (name, baselines, text) in [
         ("plain", &[&plain][..], "y_d as reference"),
         ("best", &[&plain, &nothing, &fixed][..], "the best of y_d, y_d / DC gain and no reference"),
     ] {
         for (key, scheme) in [("learned", &learned), ("unprepared", &unprepared)] {
-            let [mean, worst] = against(scheme, baselines);
             let what = format!("{}: reduction against {text}", scheme.name);
-            for (suffix, of, value) in [("", "mean", mean), ("_worst", "worst signal", worst)] {
+            for (suffix, of, value) in against(scheme, baselines) {
                 let name = format!("preview_reduction_{key}_{name}{suffix}");
                 let found = Finding::new(SECTION, &name, &[31], &format!("{what}, {of}"), value, "%");
                 let found = found.cell("Reduction", &format!("against {text}, {of}"), &scheme.name);
@@ -146,10 +145,10 @@ fn draw(
         for (curve, kind) in cut.iter_mut().zip(&kinds) {
             curve.points.push((seconds, remaining(&truncated, kind)));
         }
-        let (mean, worst) = mean_and_worst((0..signals.len()).map(|index| 100.0 * learned.errors[index] / plain.errors[index]));
+        let left = (0..signals.len()).map(|index| 100.0 * learned.errors[index] / plain.errors[index]);
         let name = format!("preview_{}_s_remaining", seconds.to_string().replace('.', "_"));
         let what = format!("learned window, {seconds} s of preview: error left of y_d as reference");
-        for (suffix, of, value) in [("", "mean", mean), ("_worst", "worst signal", worst)] {
+        for (suffix, of, value) in summary(left, "mean", "worst signal") {
             let found = Finding::new(SECTION, &format!("{name}{suffix}"), &[31], &format!("{what}, {of}"), value, "%");
             study.find(found.cell("Error left of y_d as reference", of, &format!("{seconds} s of preview")));
         }

@@ -1,13 +1,11 @@
 //! Row 11.
 
 use impromptu_lti::{
-    extensions::{
-        mean_and_worst,
-        two_regions::{self, FADE, HYSTERESIS, NOISE, SCHEMES},
-    },
+    extensions::two_regions::{self, FADE, HYSTERESIS, NOISE, SCHEMES},
     levenberg_marquardt::Settings,
 };
 
+use super::summary;
 use crate::{
     report::{Axis, Curve, Figure},
     study::{Finding, Study},
@@ -34,8 +32,7 @@ pub(super) fn add(study: &mut Study, settings: &Settings, others: u64, seed: u64
             ("RMS of y - y_d", "error", trials.iter().map(|trial| trial.error[index]).collect::<Vec<_>>()),
             ("largest jump of the reference in a sample", "jump", trials.iter().map(|trial| trial.jump[index]).collect()),
         ] {
-            let (mean, worst) = mean_and_worst(values);
-            for (suffix, of, value) in [("", "mean", mean), ("_worst", "worst", worst)] {
+            for (suffix, of, value) in summary(values, "mean", "worst") {
                 let text = format!("{what}, {scheme}, {of}");
                 let found = Finding::new(SECTION, &format!("regions_{name}_{key}{suffix}"), &[11], &text, value, "");
                 study.find(found.cell(TABLE, scheme, &format!("{what}, {of}")));

@@ -77,11 +77,10 @@ fn fly(
     learned: &Learned,
     law: &dyn Module<f64>,
 ) -> Result<Vec<Assessment>> {
-    let steps = learned.fit.progress.len().saturating_sub(1) as f64;
     let name = format!("{key}_iterations");
     let text = format!("steps of Levenberg-Marquardt, {what}");
     let row = |precision: &str| format!("{what}, {precision}");
-    let steps = finding(system, &name, &[18], &text, steps, "").asked(Asked::AtMost(1000.0));
+    let steps = finding(system, &name, &[18], &text, learned.fit.steps() as f64, "").asked(Asked::AtMost(1000.0));
     study.find(steps.cell(system.title, &row("f64"), "Levenberg-Marquardt, steps"));
     let assessed = |module: &dyn Module<f64>| assess(&system.model, module, law, &super::desired, &Start::rest(), samples());
     let mut flown = vec![assessed(&learned.module())];
