@@ -200,6 +200,20 @@ impl Study {
         rows.iter().copied().filter(|row| !self.findings.iter().any(|finding| finding.rows.contains(row))).collect()
     }
 
+    /// Asserts that each number and figure has a name of its own, numbers are finite and figures can be read. Gives the figures' names.
+    #[cfg(test)]
+    fn assert_readable(&self) -> Vec<&str> {
+        let figures: Vec<&str> = self.figures.iter().map(|figure| figure.name.as_str()).collect();
+        let mut names: Vec<&str> = self.findings.iter().map(|finding| finding.name.as_str()).chain(figures.clone()).collect();
+        let count = names.len();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), count);
+        assert!(self.findings.iter().all(|finding| finding.value.is_finite()));
+        assert!(self.figures.iter().all(|figure| !figure.curves.is_empty() && figure.curves.len() <= 6));
+        figures
+    }
+
     /// Numbers of a section.
     pub fn of_section<'a>(&'a self, section: &'a str) -> impl Iterator<Item = &'a Finding> {
         self.findings.iter().filter(move |finding| finding.section == section)

@@ -56,6 +56,10 @@ impl Outcome {
             && properties.practical_degree.value.abs_diff(practical) <= 1
     }
 
+    fn covered(&self) -> bool {
+        self.found.prediction.reduction_percent.contains(self.measured)
+    }
+
     fn line(&self) -> String {
         let (properties, Interval { low, value, high }) = (&self.found.properties, self.found.prediction.reduction_percent);
         let zeros: Vec<String> = properties.zeros.iter().map(|zero| zero.words()).collect();
@@ -70,7 +74,7 @@ impl Outcome {
             properties.gain.value,
             self.known.model.gain(),
             self.measured,
-            if self.found.prediction.reduction_percent.contains(self.measured) { "covered" } else { "MISSED" },
+            if self.covered() { "covered" } else { "MISSED" },
             self.found.prediction.window,
             self.found.model.denominator.len() - 1,
             self.known.model.denominator.len() - 1,
@@ -83,25 +87,26 @@ fn outcomes(seed: u64, count: usize) -> Vec<Outcome> {
     (0..count).into_par_iter().map(|index| Outcome::of(index, seed)).collect()
 }
 
+fn lines(outcomes: &[Outcome]) -> String {
+    outcomes.iter().map(Outcome::line).collect::<Vec<_>>().join("\n")
+}
+
 #[test]
 fn twenty_loops_are_judged_rightly_and_eighteen_predictions_hold() {
     let outcomes = outcomes(TEST_SEED, 20);
-    let text: Vec<String> = outcomes.iter().map(Outcome::line).collect();
-    let text = text.join("\n");
+    let text = lines(&outcomes);
     println!("{text}");
     assert!(outcomes.iter().all(|outcome| outcome.found.verdict == outcome.wanted()), "{text}");
     assert!(outcomes.iter().all(Outcome::degrees_right), "{text}");
-    let covered = outcomes.iter().filter(|outcome| outcome.found.prediction.reduction_percent.contains(outcome.measured));
-    assert!(covered.count() >= 18, "{text}");
+    assert!(outcomes.iter().filter(|outcome| outcome.covered()).count() >= 18, "{text}");
 }
 
-/// For whoever changes the diagnosis: loops of other seeds, to be read. `cargo test -p impromptu-diagnosis -- --ignored --nocapture tuning`
+/// Loops of other seeds: the twenty are no lucky ones.
 #[test]
-#[ignore = "a table to read, not a promise"]
-fn tuning() {
-    for base in 21..=25u64 {
-        for outcome in outcomes(base << 20, 20) {
-            println!("{}", outcome.line());
-        }
-    }
+fn a_hundred_more_loops_are_judged_rightly_and_95_predictions_hold() {
+    let outcomes: Vec<Outcome> = (21..=25u64).flat_map(|base| outcomes(base << 20, 20)).collect();
+    let text = lines(&outcomes);
+    assert!(outcomes.iter().all(|outcome| outcome.found.verdict == outcome.wanted()), "{text}");
+    assert!(outcomes.iter().all(Outcome::degrees_right), "{text}");
+    assert!(outcomes.iter().filter(|outcome| outcome.covered()).count() >= 95, "{text}");
 }

@@ -49,15 +49,12 @@ fn the_papers_rows_on_linear_systems_come_out_as_it_states_them() {
 
 #[test]
 fn every_number_and_figure_has_a_name_of_its_own_and_is_finite() {
-    let study = &*QUICK;
-    let mut names: Vec<&str> = study.findings.iter().map(|finding| finding.name.as_str()).collect();
-    names.extend(study.figures.iter().map(|figure| figure.name.as_str()));
-    let count = names.len();
-    names.sort_unstable();
-    names.dedup();
-    assert_eq!(names.len(), count);
-    assert!(study.findings.iter().all(|finding| finding.value.is_finite()));
-    assert!(study.figures.iter().all(|figure| figure.curves.len() <= 6));
+    let figures = QUICK.assert_readable();
+    for name in
+        ["s1_figure_2a", "s1_figure_2b", "s2_figure_2a", "s2_figure_2b", "exact_law_error", "disturbance_and_initial_error"]
+    {
+        assert!(figures.contains(&name), "no figure {name}");
+    }
 }
 
 /// Asked are 1e-8 in f64 and 4e-7 in the firmware's f32 kernel; the paper has 2e-6, and 0.06 for S2.

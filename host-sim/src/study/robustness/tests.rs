@@ -1,18 +1,107 @@
-//! A Monte Carlo run that is cut, shared out and merged.
+//! The whole study with a small recipe; a Monte Carlo run that is cut, shared out and merged.
 
 use std::path::{Path, PathBuf};
 
 use impromptu_firmware::model::Model;
 
 use super::{
+    CASES, DEVIATIONS, PARAMETERS, Settings, WINDS,
     draws::{DrawSettings, Ranges, fly_draws},
+    effort::EFFORTS,
     ledger::{Header, LedgerError, Shard, merge},
+    run,
 };
 use crate::{
     condition::Condition,
-    experiment::{Loop, Recipe, Rows, describe, feedforward},
+    experiment::{Excitation, LaneRecipe, Loop, Recipe, Rows, demo::Observer, describe, feedforward},
     plant::Vehicle,
+    report::render_study,
+    training::TrainingSettings,
 };
+
+struct Silent;
+
+impl Observer for Silent {
+    fn stage(&self, _: &str) {}
+    fn steps(&self, _: u64, _: u64) {}
+}
+
+/// Few flights, few epochs, one lane to choose from.
+fn small() -> Recipe {
+    let full = Recipe::default();
+    Recipe {
+        excitations: full.excitations.iter().map(|of| Excitation { flights: 30, ..*of }).collect(),
+        network: TrainingSettings { epochs: 8, ..full.network },
+        weight_decays: vec![0.03],
+        shares: vec![1.0],
+        fine_tuning: TrainingSettings { epochs: 1, ..full.fine_tuning },
+        lane: LaneRecipe { efforts: vec![6e-3], velocity_weights: vec![0.05], fast_limits: vec![0.1], ..full.lane },
+        validation_strokes: 4,
+        ..full
+    }
+}
+
+#[test]
+fn the_study_tells_every_case_deviation_vehicle_and_effort() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = Settings {
+        seed: 1,
+        loops: vec![lab()],
+        strokes: 6,
+        draws: 3,
+        draw_strokes: 2,
+        ranges: Ranges::default(),
+        recipe: small(),
+        out: folder.path().to_owned(),
+    };
+    let study = run(&settings, "host-sim study robustness", &Silent).unwrap();
+    let value = |name: &str| {
+        let name = format!("crazyflie_stock_lab_{name}");
+        study.value(&name).unwrap_or_else(|| panic!("no number {name}"))
+    };
+    study.assert_readable();
+    let curves = |name: &str| {
+        let name = format!("crazyflie_stock_lab_{name}");
+        let figure = study.figures.iter().find(|figure| figure.name == name).unwrap_or_else(|| panic!("no figure {name}"));
+        &figure.curves
+    };
+
+    // Whatever is off, the lanes help, and the feedback lane sees what the network cannot.
+    let cases = CASES.iter().map(|case| case.name).chain(["nominal", "delay_plus_20_ms"]).map(str::to_owned);
+    let deviations = PARAMETERS.iter().flat_map(|of| ["minus_30", "plus_30"].map(|by| format!("{}_{by}", of.name)));
+    for case in cases.chain(deviations) {
+        let (both, network) = (value(&format!("{case}_both_mean")), value(&format!("{case}_network_mean")));
+        assert!(both > 0.0 && both > network, "{case}: {both} {network}");
+    }
+    for way in ["both", "network"] {
+        let nominal = value(&format!("nominal_{way}_mean"));
+        let curves = curves(&format!("deviations_{way}"));
+        assert_eq!(curves.len(), PARAMETERS.len());
+        for curve in curves {
+            assert_eq!(curve.points.len(), DEVIATIONS.len());
+            assert!(curve.points.contains(&(0.0, nominal)), "{}: {:?}, nominal {nominal}", curve.label, curve.points);
+        }
+    }
+    assert!(curves("wind").iter().all(|curve| curve.points.len() == WINDS.len()));
+    curves("draws");
+
+    // Margins are bought with reduction, and no lane is better than the one that knows everything.
+    let figures = ["effort", "delay_margin", "modulus_margin", "margins"].map(curves);
+    assert!(figures.iter().flat_map(|curves| curves.iter()).all(|curve| !curve.points.is_empty()));
+    let at = |effort: f64, name: &str| value(&format!("effort_{effort:.1e}_{name}").replace('.', "_").replace("e-", "e_minus_"));
+    for pair in EFFORTS.windows(2) {
+        for margin in ["delay_margin", "gain_margin", "modulus_margin"] {
+            assert!(at(pair[0], margin) <= at(pair[1], margin), "{margin} at {pair:?}");
+        }
+        assert!(at(pair[0], "limit") > at(pair[1], "limit"), "limit at {pair:?}");
+    }
+    for effort in EFFORTS {
+        assert!(at(effort, "limit") > at(effort, "nominal_mean"), "{effort}");
+    }
+    let [cheap, dear] = [EFFORTS[2], EFFORTS[EFFORTS.len() - 1]].map(|effort| at(effort, "nominal_mean"));
+    assert!(cheap > dear, "{cheap} {dear}");
+    assert!(render_study(&study).unwrap().contains("What robustness costs"));
+}
 
 /// A model that needs no training: flatness feed-forward.
 fn model(plant: &Loop) -> Vec<u8> {
