@@ -15,8 +15,6 @@
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 pub mod math;
-pub mod types;
-
 pub mod preview;
 
 pub mod features;
@@ -33,20 +31,6 @@ pub mod adapter;
 
 pub mod region;
 
-pub mod control;
-
-pub mod quadrotor;
-
-pub mod flight;
-
 pub mod exchange;
 
-pub mod link;
-
-pub mod autopilot;
-
-pub mod application;
-
 pub mod storage;
-
-pub mod replay;

@@ -5,10 +5,8 @@
 //! the correction is reference minus output. What differs: late measurements are shifted back by the known delay, and noisy
 //! logs are smoothed with zero phase, output and reference alike, which leaves a linear relation between them as it is.
 
-use impromptu_firmware::{
-    features::{self, Feature, Signals},
-    quadrotor::{DESIRED, MEASURED, REFERENCE},
-};
+use impromptu_firmware::features::{self, Feature, Signals};
+use impromptu_flight::quadrotor::{DESIRED, MEASURED, REFERENCE};
 
 use crate::{
     flight_log::{BODY, FlightLog},

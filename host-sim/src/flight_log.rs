@@ -10,7 +10,7 @@
 
 use std::{fs::File, io, ops::Range, path::Path};
 
-use impromptu_firmware::quadrotor::MEASURED;
+use impromptu_flight::quadrotor::MEASURED;
 
 use crate::trajectory::Sample;
 

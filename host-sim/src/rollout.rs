@@ -1,17 +1,19 @@
 //! Closed-loop flights: eight at once through the plant, each with the firmware's own flight stack.
 //!
 //! *in* [`FlightPlan`]s; *out* a [`FlightRecord`] each; *never* a result that depends on the order of the plans, on the other flights
-//! or on the number of threads; *source* Zhou 2017, Fig. 1; rates of `impromptu_firmware::flight::Rates`.
+//! or on the number of threads; *source* Zhou 2017, Fig. 1; rates of `impromptu_flight::flight::Rates`.
 
 mod pilot;
 mod stack;
 
 use impromptu_firmware::{
     adapter::Lanes,
-    control::{Airframe, AttitudeGains, PositionGains},
-    flight::{Rates, Settings},
     guard::{GuardSettings, Trips},
     model::Model,
+};
+use impromptu_flight::{
+    control::{Airframe, AttitudeGains, PositionGains},
+    flight::{Rates, Settings},
     replay::Recorded,
     types::Setpoint,
 };

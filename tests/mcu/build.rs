@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rustc-link-arg-bins=--nmagic");
     // Its images need the flash of the uploaded models.
     println!("cargo::rustc-link-arg-bins=--defsym=_impromptu_no_models=1");
-    // A fault ends the emulator, see firmware/build.rs.
+    // A fault ends the emulator, see firmware/board/build.rs.
     println!("cargo::rustc-link-arg-bins=--defsym=HardFault=0");
     Ok(())
 }

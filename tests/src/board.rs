@@ -3,10 +3,8 @@
 use std::{fs, path::PathBuf, time::Duration};
 
 use anyhow::{Context, Result, bail, ensure};
-use impromptu_firmware::{
-    model::file,
-    replay::{ANSWER, Recorded},
-};
+use impromptu_firmware::model::file;
+use impromptu_flight::replay::{ANSWER, Recorded};
 
 use crate::emulator::{FIRMWARE, Output, build_firmware, run, target_folder};
 
@@ -29,7 +27,7 @@ const ANSWER_NAMES: [&str; ANSWER / 4] = [
 
 /// Builds the emulated board with the bytes of a model file in its flash, or with none; gives the ELF file.
 pub fn build(model: Option<&[u8]>) -> Result<PathBuf> {
-    let Some(bytes) = model else { return build_firmware("impromptu-firmware", "netduinoplus2", FIRMWARE, &[]) };
+    let Some(bytes) = model else { return build_firmware("impromptu-board", "netduinoplus2", FIRMWARE, &[]) };
     let folder = target_folder().join("models");
     fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
     let path = folder.join(format!("{:08x}.model", file::checksum(bytes)));
@@ -38,7 +36,7 @@ pub fn build(model: Option<&[u8]>) -> Result<PathBuf> {
     }
     let path = path.canonicalize()?;
     let path = path.to_str().context("the target folder's name is not Unicode")?;
-    build_firmware("impromptu-firmware", "netduinoplus2", FIRMWARE, &[("IMPROMPTU_MODEL", path)])
+    build_firmware("impromptu-board", "netduinoplus2", FIRMWARE, &[("IMPROMPTU_MODEL", path)])
 }
 
 /// Starts the board with a recording in its folder, named after the flight `name`; gives what it printed, and the answers if it wrote any.

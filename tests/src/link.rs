@@ -3,7 +3,7 @@
 //! *in* bytes; *out* how many messages were delivered; *never* a panic, a message whose number is not finite, or one that does not arrive
 //! again when it is sent again: that is what the fuzz target and the test on stable Rust look for.
 
-use impromptu_firmware::link::{Commands, Direction, FRAME, Message, Reason, Receiver, Reports, encode};
+use impromptu_flight::link::{Commands, Direction, FRAME, Message, Reason, Receiver, Reports, encode};
 use serde::{Serialize, Serializer, ser::SerializeTuple};
 
 /// Separates the messages that are put into frames: a byte which few numbers have.

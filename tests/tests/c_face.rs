@@ -9,10 +9,12 @@ use std::{
 
 use impromptu_firmware::{
     adapter::{Adapter, Lanes},
-    flight::{Flight, PREVIEW},
     model::Model,
     network::Scratch,
     preview::Preview,
+};
+use impromptu_flight::{
+    flight::{Flight, PREVIEW},
     quadrotor::{self, DESIRED, MEASURED, REFERENCE},
     replay::{Event, HEADER, Header, RECORD},
     types::{State, Tick},
@@ -101,7 +103,7 @@ fn script(file: &[u8]) -> (Vec<u8>, Vec<u8>) {
     let (mut script, mut answers) = (Vec::new(), Vec::new());
     script.extend(TICKS.to_le_bytes());
     script.extend((file.len() as u32).to_le_bytes());
-    let impromptu_firmware::control::Airframe { mass, inertia, rotors, directions, .. } = settings.airframe;
+    let impromptu_flight::control::Airframe { mass, inertia, rotors, directions, .. } = settings.airframe;
     let airframe =
         [settings.airframe.thrust_coefficient, settings.airframe.torque_coefficient, settings.airframe.max_rotor_speed];
     let position = settings.position;

@@ -28,7 +28,7 @@ fn a_recording_that_cannot_be_flown_again_ends_the_board_with_a_reason() {
         recording[at] = byte;
         recording
     };
-    let record = impromptu_firmware::replay::RECORD;
+    let record = impromptu_flight::replay::RECORD;
     let cases = [
         ("missing", Vec::new(), "recording.bin in the folder"),
         ("truncated", flight.recording[..length - record].to_vec(), "recording.bin in the folder"),
@@ -60,7 +60,7 @@ fn a_damaged_model_ends_the_board_with_the_refusal() {
 
 #[test]
 fn a_board_that_does_not_end_is_stopped() {
-    let elf = build_firmware("impromptu-firmware", "netduinoplus2", FIRMWARE, &[]).unwrap();
+    let elf = build_firmware("impromptu-board", "netduinoplus2", FIRMWARE, &[]).unwrap();
     let error = run(&elf, &folder("emulator-timeout"), Duration::ZERO).unwrap_err();
     assert!(error.to_string().contains("did not end within 0 s"), "{error}");
 }

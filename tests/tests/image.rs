@@ -144,7 +144,7 @@ fn behind_a_boot_loader_the_program_starts_with_its_vectors() {
 
 #[test]
 fn binaries_without_slots_still_lie_below_them() {
-    let elf: &Path = &build_firmware("impromptu-firmware", "netduinoplus2", FIRMWARE, &[]).unwrap();
+    let elf: &Path = &build_firmware("impromptu-board", "netduinoplus2", FIRMWARE, &[]).unwrap();
     let bytes = fs::read(elf).unwrap();
     assert_loads_below(&Elf::parse(bytes.as_slice()).unwrap(), SLOTS, "netduinoplus2");
 }

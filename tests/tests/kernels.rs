@@ -95,7 +95,7 @@ fn assembly_and_twin_give_the_same_bits_on_the_board_and_here() {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("kernels");
     fs::create_dir_all(&folder).unwrap();
     fs::write(folder.join("cases.bin"), file).unwrap();
-    let elf = build_firmware("impromptu-firmware", "kernels", FIRMWARE, &[]).unwrap();
+    let elf = build_firmware("impromptu-board", "kernels", FIRMWARE, &[]).unwrap();
     let output = run(&elf, &folder, Duration::from_secs(120)).unwrap();
     let report = output.report().unwrap();
     let unaligned = cases.iter().filter(|case| case.header[6] > 0).count();

@@ -1,6 +1,7 @@
 //! Processor in the loop: the binary that would be flashed flies the plant, tick by tick.
 
-use impromptu_firmware::{adapter::Lanes, link::message::Telemetry, model::Model, replay::ANSWER};
+use impromptu_firmware::{adapter::Lanes, model::Model};
+use impromptu_flight::{link::message::Telemetry, replay::ANSWER};
 use impromptu_host_sim::{
     condition::Condition,
     experiment::Loop,

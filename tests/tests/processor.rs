@@ -2,10 +2,12 @@
 
 use impromptu_firmware::{
     adapter::{Inference, Lanes},
-    flight::Flight,
     guard::Trip,
     model::{MAX_OUTPUTS, Model},
     network::Scratch,
+};
+use impromptu_flight::{
+    flight::Flight,
     types::{State, Tick},
 };
 use impromptu_host_sim::{

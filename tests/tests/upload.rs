@@ -2,8 +2,10 @@
 
 use impromptu_firmware::{
     adapter::Lanes,
-    link::{Reason, outcome::ModelFault},
     model::{Model, file},
+};
+use impromptu_flight::{
+    link::{Reason, outcome::ModelFault},
     types::{Setpoint, State, Tick},
 };
 use impromptu_host_sim::{

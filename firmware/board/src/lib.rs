@@ -6,7 +6,7 @@ pub mod slots;
 mod start;
 mod tasks;
 
-use impromptu_firmware::{
+use impromptu_flight::{
     control::{Airframe, AttitudeGains, PositionGains},
     flight::{Rates, Settings},
 };

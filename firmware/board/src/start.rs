@@ -1,12 +1,11 @@
 //! What a board starts with: the newest model of its slots that it can fly, and the loop of a Crazyflie until it is sent another.
 
 use impromptu_firmware::{
-    application::Application,
-    flight::Flight,
     model::{Model, Refusal},
     network::{Network, Scratch},
     storage::{Place, Sequence, Survey, survey},
 };
+use impromptu_flight::{application::Application, flight::Flight};
 use static_cell::ConstStaticCell;
 
 use crate::CRAZYFLIE;

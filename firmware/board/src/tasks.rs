@@ -10,12 +10,14 @@ use core::{
 
 use impromptu_firmware::{
     adapter::{Inference, Job},
-    application::{Application, Upload, WORDS, outcome_from_words, outcome_words},
-    autopilot::Meters,
     exchange::Mailbox,
     model::{MAX_FEATURES, MAX_OUTPUTS},
     network::{Network, Scratch},
     storage::{Slot, Uploader},
+};
+use impromptu_flight::{
+    application::{Application, Upload, WORDS, outcome_from_words, outcome_words},
+    autopilot::Meters,
     types::MotorCommand,
 };
 

@@ -1,13 +1,15 @@
 //! The flight stack with its settings.
 //!
 //! *in* states, setpoints, a model; *out* motor commands; *never* other bits than those of the flight stack in Rust; *source*
-//! [`impromptu_firmware::flight`].
+//! [`impromptu_flight::flight`].
 
 use impromptu_firmware::{
     adapter::{Inference, Job, Lanes},
-    flight::{Flight, Settings},
     model::Model,
     network::Scratch,
+};
+use impromptu_flight::{
+    flight::{Flight, Settings},
     types::{MotorCommand, Tick},
 };
 

@@ -1,16 +1,17 @@
 //! Plain numbers as C sees them.
 //!
 //! *in/out* structures of f32, u32 and i32 in a layout that C knows; *never* padding between numbers, a pointer into the library, or a
-//! value that Rust could not hold; *source* [`impromptu_firmware::types`], [`impromptu_firmware::flight::Settings`].
+//! value that Rust could not hold; *source* [`impromptu_flight::types`], [`impromptu_flight::flight::Settings`].
 
 use core::ffi::c_char;
 
 use impromptu_firmware::{
     adapter::{self, Adapter},
-    control::{self, PositionGains},
-    flight,
     model::{self, Model},
-    types,
+};
+use impromptu_flight::{
+    control::{self, PositionGains},
+    flight, types,
 };
 
 /// Most channels of a signal.

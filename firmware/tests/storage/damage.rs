@@ -8,7 +8,7 @@ use impromptu_firmware::{
 
 use crate::{
     flash::{CAPACITY, Simulated, Supply},
-    models::{FLOAT, INTEGER, anything, cart, named, quadrotor, with_wrong_probe},
+    models::{FLOAT, INTEGER, anything, cart, named, servo, with_wrong_probe},
 };
 
 type Flash = Simulated<1, CAPACITY>;
@@ -73,10 +73,10 @@ fn a_newer_model_that_does_not_fly_here_is_passed_over() {
 #[test]
 fn where_nothing_flies_the_newest_intact_model_is_kept() {
     let slots = [slot(5, FLOAT), slot(4, INTEGER)];
-    let found = survey(slots.each_ref().map(Slot::bytes), &mut Scratch::new(), quadrotor);
+    let found = survey(slots.each_ref().map(Slot::bytes), &mut Scratch::new(), servo);
     assert_eq!((found.flies, found.spare, found.sequence), (None, Place::Second, Sequence(6)));
     let slots = [Flash::new(&Supply::new()), slot(4, INTEGER)];
-    let found = survey(slots.each_ref().map(Slot::bytes), &mut Scratch::new(), quadrotor);
+    let found = survey(slots.each_ref().map(Slot::bytes), &mut Scratch::new(), servo);
     assert_eq!((found.flies, found.spare, found.sequence), (None, Place::First, Sequence(5)));
 }
 

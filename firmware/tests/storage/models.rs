@@ -2,10 +2,12 @@
 
 use impromptu_firmware::{
     adapter::Adapter,
-    flight::{PREVIEW, QuadrotorAdapter},
-    model::{Model, Refusal, file},
-    quadrotor,
+    model::{Channel, Channels, Model, Refusal, file},
+    preview::EndRule,
 };
+
+/// Samples of the desired trajectory that these loops keep.
+const PREVIEW: usize = 192;
 
 pub(crate) const FLOAT: &[u8] = include_bytes!("../../../tests/golden/models/float-skip.model");
 pub(crate) const INTEGER: &[u8] = include_bytes!("../../../tests/golden/models/int8-lane.model");
@@ -52,9 +54,11 @@ pub(crate) fn anything(_: &Model<'_>) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// The flight stack, which is not for models of a cart.
-pub(crate) fn quadrotor(model: &Model<'_>) -> Result<(), Refusal> {
-    QuadrotorAdapter::new(model, quadrotor::signals(), 100.0, PREVIEW).map(drop)
+/// A servo, which is not for models of a cart.
+pub(crate) fn servo(model: &Model<'_>) -> Result<(), Refusal> {
+    let angle = [Channel { name: "angle", unit: "rad", frame: "joint", end: EndRule::Hold }];
+    let signals = Channels { desired: &angle, measured: &angle, reference: &angle };
+    Adapter::<1, 1, 1>::new(model, signals, 100.0, PREVIEW).map(drop)
 }
 
 /// The cart of all these models.

@@ -7,7 +7,7 @@ use impromptu_firmware::{
 };
 use proptest::prelude::*;
 
-use crate::models::{FLOAT, INTEGER, anything, cart, named, quadrotor, with_wrong_probe};
+use crate::models::{FLOAT, INTEGER, anything, cart, named, servo, with_wrong_probe};
 
 type Flash = RamFlash<2048>;
 
@@ -35,7 +35,7 @@ fn a_refused_model_never_displaces_the_good_one() {
     let mut flipped = FLOAT.to_vec();
     flipped[700] ^= 4;
     let cases: [(&[u8], Check); 5] =
-        [(INTEGER, quadrotor), (&wrong_probe, anything), (&flipped, anything), (&FLOAT[..1000], anything), (&[], anything)];
+        [(INTEGER, servo), (&wrong_probe, anything), (&flipped, anything), (&FLOAT[..1000], anything), (&[], anything)];
     let mut refusals = Vec::new();
     for (bad, check) in cases {
         let (stored, mut uploader) = open(&mut slots, cart);
@@ -118,7 +118,7 @@ fn a_repeated_commit_is_acknowledged_and_another_upload_waits_for_a_restart() {
     let (_, mut uploader) = open(&mut slots, anything);
     send(&mut uploader, INTEGER).unwrap();
     let first = uploader.commit(DISARMED, &mut Scratch::new(), anything).unwrap().sequence();
-    assert_eq!(uploader.commit(DISARMED, &mut Scratch::new(), quadrotor).unwrap().sequence(), first);
+    assert_eq!(uploader.commit(DISARMED, &mut Scratch::new(), servo).unwrap().sequence(), first);
     assert_eq!(send(&mut uploader, FLOAT), Err(StorageError::Restart));
     let third = named(b"third");
     let (stored, mut uploader) = open(&mut slots, anything);

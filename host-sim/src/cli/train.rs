@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
-use impromptu_firmware::flight::Rates;
+use impromptu_flight::flight::Rates;
 use impromptu_model_export::{
     Description, Precision,
     description::{LaneDescription, Provenance, Timing},

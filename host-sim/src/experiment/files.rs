@@ -72,7 +72,7 @@ fn column(feature: &Feature, signals: &Signals) -> String {
 
 #[cfg(test)]
 mod tests {
-    use impromptu_firmware::quadrotor;
+    use impromptu_flight::quadrotor;
 
     use super::*;
 

@@ -1,6 +1,7 @@
 //! The flights of an experiment: one vehicle with its gains under one condition.
 
-use impromptu_firmware::{adapter::Lanes, flight::Settings, guard::GuardSettings, model::Model};
+use impromptu_firmware::{adapter::Lanes, guard::GuardSettings, model::Model};
+use impromptu_flight::flight::Settings;
 
 use crate::{
     condition::Condition,

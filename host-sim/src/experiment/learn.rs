@@ -1,6 +1,6 @@
 //! From logs to networks: ridge regression, the network that refines it, the same fine-tuned for int8.
 
-use impromptu_firmware::quadrotor::REFERENCE;
+use impromptu_flight::quadrotor::REFERENCE;
 use impromptu_model_export::{Batch, FloatNetwork, Precision};
 
 use super::{

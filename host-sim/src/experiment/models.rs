@@ -2,8 +2,10 @@
 
 use impromptu_firmware::{
     features::{Feature, Relative, Source},
-    flight::Settings,
     model::{Interpolation, Output},
+};
+use impromptu_flight::{
+    flight::Settings,
     quadrotor::{self, REFERENCE},
 };
 use impromptu_model_export::{

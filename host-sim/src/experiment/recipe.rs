@@ -3,9 +3,9 @@
 use garde::Validate;
 use impromptu_firmware::{
     features::{Feature, window},
-    flight::PREVIEW,
     model::Interpolation,
 };
+use impromptu_flight::flight::PREVIEW;
 use serde::{Deserialize, Serialize};
 
 use crate::{

@@ -2,10 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use impromptu_firmware::{
-    adapter::Lanes,
+use impromptu_firmware::{adapter::Lanes, guard::Trips};
+use impromptu_flight::{
     flight::Settings,
-    guard::Trips,
     link::{
         Command, FRAME, Outcome, Reason, Receiver, Report, Reports, Sender,
         message::{Inertial, LaneReport, Position, Telemetry, TimedSetpoint},

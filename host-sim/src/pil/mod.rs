@@ -1,7 +1,7 @@
 //! Processor in the loop: the plant here, the flight stack in the binary that is flashed.
 //!
 //! *in* flight plans; *out* the flights that the microcontroller flew, and what it measured of itself; *never* another bit than the
-//! software's, if the link is perfect; *source* ours; the link is `impromptu_firmware::link`.
+//! software's, if the link is perfect; *source* ours; the link is `impromptu_flight::link`.
 
 mod board;
 mod emulator;
@@ -17,7 +17,7 @@ pub use faults::{Faults, Faulty};
 pub use flights::{CYCLES_PER_INSTRUCTION, PilReport, fly};
 pub use line::{Line, Lockstep, Serial};
 
-use impromptu_firmware::link::Reason;
+use impromptu_flight::link::Reason;
 
 /// Why the microcontroller does not fly.
 #[derive(Debug, thiserror::Error)]

@@ -3,7 +3,7 @@
 //! *in* a plan and the plant's state at each control tick; *out* rotor commands, and at the end a record; *never* the truth
 //! where the vehicle would have a measurement; *source* Zhou 2017, Fig. 1.
 
-use impromptu_firmware::{
+use impromptu_flight::{
     flight::{PREVIEW, Settings},
     quadrotor,
     replay::Recorder,

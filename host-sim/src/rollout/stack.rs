@@ -1,12 +1,11 @@
 //! What flies a vehicle: the flight stack in this program, or the same one in a microcontroller.
 //!
 //! *in* setpoints ahead of time, and the state at each control tick; *out* motor commands; *never* a time of its own; *source* the calls of
-//! [`impromptu_firmware::flight::Flight`].
+//! [`impromptu_flight::flight::Flight`].
 
-use impromptu_firmware::{
+use impromptu_firmware::{guard::Trips, network::Scratch};
+use impromptu_flight::{
     flight::{Flight, Settings},
-    guard::Trips,
-    network::Scratch,
     types::{MotorCommand, Reference, Setpoint, State, Tick},
 };
 use nalgebra::Vector3;

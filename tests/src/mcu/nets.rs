@@ -6,8 +6,8 @@ use anyhow::{Context, Result, anyhow};
 use impromptu_firmware::{
     features::{Feature, window},
     model::{Interpolation, Output},
-    quadrotor,
 };
+use impromptu_flight::quadrotor;
 use impromptu_model_export::{
     Description, FloatNetwork,
     description::{Provenance, Timing},

@@ -2,12 +2,10 @@
 
 use std::collections::VecDeque;
 
-use impromptu_firmware::{
-    adapter::Lanes,
+use impromptu_firmware::{adapter::Lanes, model::Model, network::Scratch};
+use impromptu_flight::{
     control::{Airframe, AttitudeGains, PositionGains},
     flight::{Flight, Rates, Settings},
-    model::Model,
-    network::Scratch,
     replay::{Event, Recorded, Recorder},
     types::{MotorCommand, Setpoint, State, Tick},
 };

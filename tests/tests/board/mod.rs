@@ -5,7 +5,8 @@ pub(crate) mod model;
 
 use std::fmt::Write;
 
-use impromptu_firmware::{adapter::Lanes, model::Model, replay::Event};
+use impromptu_firmware::{adapter::Lanes, model::Model};
+use impromptu_flight::replay::Event;
 use impromptu_model_export::Precision;
 use impromptu_tests::{board::fly_again, emulator, golden};
 use nalgebra::Vector3;

@@ -3,8 +3,8 @@
 use impromptu_firmware::{
     features::{Feature, window},
     model::{Interpolation, Margins, Output},
-    quadrotor,
 };
+use impromptu_flight::quadrotor;
 use impromptu_model_export::{
     Description, FloatNetwork, Precision,
     description::{LaneAxisDescription, LaneDescription, MonitorAxisDescription, MonitorDescription, Provenance, Timing},

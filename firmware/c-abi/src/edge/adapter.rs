@@ -6,8 +6,8 @@ use impromptu_firmware::{
     adapter::{Adapter, Lanes},
     model::{Channels, Model},
     network::Scratch,
-    quadrotor,
 };
+use impromptu_flight::quadrotor;
 
 use super::{Place, channels, create, input, object, report, signals::table, view};
 use crate::{

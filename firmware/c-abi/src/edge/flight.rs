@@ -2,7 +2,8 @@
 
 use core::{ffi::c_int, ptr};
 
-use impromptu_firmware::{adapter::Lanes, flight::Flight, model::Model, network::Scratch};
+use impromptu_firmware::{adapter::Lanes, model::Model, network::Scratch};
+use impromptu_flight::flight::Flight;
 
 use super::{Place, create, input, object, report, view};
 use crate::{

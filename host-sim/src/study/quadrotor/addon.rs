@@ -8,8 +8,8 @@ use impromptu_firmware::{
     adapter::Lanes,
     features::{Feature, Relative, Source},
     model::{Interpolation, Model},
-    quadrotor::REFERENCE,
 };
+use impromptu_flight::quadrotor::REFERENCE;
 use impromptu_model_export::{ExportError, FloatNetwork, Precision, encode};
 
 use super::inputs::Origin;

@@ -4,11 +4,13 @@
 
 use impromptu_firmware::{
     adapter::{Adapter, Lanes},
-    flight::{Flight, PREVIEW, QuadrotorAdapter, Settings},
     guard::{GuardSettings, Trips},
     model::{Model, Refusal},
     network::Scratch,
     preview::Preview,
+};
+use impromptu_flight::{
+    flight::{Flight, PREVIEW, QuadrotorAdapter, Settings},
     quadrotor::{self, DESIRED, END_RULES},
     types::{MotorCommand, Reference, Setpoint, State, Tick},
 };

@@ -3,7 +3,8 @@
 //! *in* nothing; *out* a [`Loop`] at 66.7 Hz whose commands are 100 ms late; *never* noise or wind; *source* Li et al., ICRA 2017. What differs:
 //! the vertical loop commands an acceleration, not a velocity, as the nonlinear transformation does in the plane; no limit of the tilt.
 
-use impromptu_firmware::{flight::Rates, guard::GuardSettings};
+use impromptu_firmware::guard::GuardSettings;
+use impromptu_flight::flight::Rates;
 
 use crate::{
     condition::Condition,

@@ -3,7 +3,8 @@
 //! *in* a Crazyflie and the predecessor's loop; *out* reductions over validation-like strokes by sub-rate, held and interpolated, and by preview;
 //! *never* a sub-rate that is not a whole part of the reference's rate; *source* Zhou 2017, section V-A (the module is slower than the loop).
 
-use impromptu_firmware::{flight::PREVIEW, model::Interpolation};
+use impromptu_firmware::model::Interpolation;
+use impromptu_flight::flight::PREVIEW;
 use rayon::prelude::*;
 
 use super::{

@@ -5,7 +5,7 @@
 
 use std::array;
 
-use impromptu_firmware::{
+use impromptu_flight::{
     flight::{Flight, PREVIEW},
     types::{Setpoint, State as FirmwareState, Tick},
 };

@@ -31,11 +31,13 @@ mod app {
     use cortex_m::peripheral::SCB;
     use impromptu_board::{CONTROL_HZ, Cost as _, LINK_BAUD, Start, Tasks, slots::slots, start};
     use impromptu_firmware::{
-        application::{Application, OUTBOX},
-        autopilot::Meters,
         exchange::ByteRing,
         network::{Network, Scratch},
         storage::Uploader,
+    };
+    use impromptu_flight::{
+        application::{Application, OUTBOX},
+        autopilot::Meters,
         types::MotorCommand,
     };
     use stm32f4xx_hal::{

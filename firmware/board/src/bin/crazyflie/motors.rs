@@ -1,7 +1,7 @@
 //! The motors of a Crazyflie 2.x: M1 PA1, M2 PB11, M3 PA15, M4 PB9, 328 kHz in 256 steps, as `motors.c` of Bitcraze's firmware drives them.
 
 use impromptu_board::motor::duty;
-use impromptu_firmware::types::MotorCommand;
+use impromptu_flight::types::MotorCommand;
 use stm32f4xx_hal::{
     gpio::{Debugger, PA1, PA15, PB9, PB11},
     pac::{TIM2, TIM4},

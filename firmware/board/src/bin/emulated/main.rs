@@ -27,12 +27,11 @@ mod app {
     use cortex_m::peripheral::SCB;
     use impromptu_board::{Cost as _, Start, Tasks, slots::slots, start};
     use impromptu_firmware::{
-        application::Application,
-        autopilot::Meters,
         exchange::ByteRing,
         network::{Network, Scratch},
         storage::Uploader,
     };
+    use impromptu_flight::{application::Application, autopilot::Meters};
     use stm32f4::stm32f405::{Interrupt, TIM2, TIM5, USART1};
 
     use crate::{

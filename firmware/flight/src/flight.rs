@@ -5,15 +5,17 @@
 
 use core::num::NonZeroU32;
 
+use impromptu_firmware::{
+    adapter::{Adapter, Inference, Job, Lanes},
+    model::{Model, Refusal},
+    network::Scratch,
+    preview::{EndRule, Preview},
+};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    adapter::{Adapter, Inference, Job, Lanes},
     control::{Airframe, AttitudeGains, AttitudeLoop, Mixer, PositionGains, PositionLoop, ThrustVector},
-    model::{Model, Refusal},
-    network::Scratch,
-    preview::{EndRule, Preview},
     quadrotor::{self, DESIRED, MEASURED, REFERENCE},
     types::{MotorCommand, Reference, Setpoint, State, Tick},
 };

@@ -4,10 +4,9 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::GRAVITY;
-use crate::{
-    math::{self, clamp},
-    types::{Reference, State},
-};
+use impromptu_firmware::math::{self, clamp};
+
+use crate::types::{Reference, State};
 
 /// Gains of the position loop, for each axis of the world frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -45,7 +45,7 @@ fn cut(name: &str) -> &str {
 pub struct FlyingModel<'a> {
     /// Its name.
     pub name: &'a str,
-    /// Check sum of its file ([`crate::model::file::checksum`]).
+    /// Check sum of its file ([`impromptu_firmware::model::file::checksum`]).
     pub checksum: u32,
     /// The flash slot that it is in; `None`: a part of the firmware.
     pub slot: Option<u8>,

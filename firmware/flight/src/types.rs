@@ -3,9 +3,8 @@
 //! *in/out* plain values in SI units, world ENU, body FLU; *never* a motor command outside 0..1 or non-finite;
 //! *source* conventions of the crate root.
 
+use impromptu_firmware::math::{clamp, finite_or_zero};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
-
-use crate::math::{clamp, finite_or_zero};
 
 /// Count of control ticks (500 Hz by default) since the stack started.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]

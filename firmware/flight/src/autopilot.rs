@@ -13,18 +13,20 @@
 
 mod news;
 
+use impromptu_firmware::{
+    adapter::{Inference, Job, Lanes},
+    guard::Trip,
+    math::sqrt,
+    model::{Model, Refusal},
+};
 use nalgebra::{Quaternion, UnitQuaternion, Vector4};
 
 use crate::{
-    adapter::{Inference, Job, Lanes},
     flight::{Flight, PREVIEW, Rates, Settings},
-    guard::Trip,
     link::{
         Command, Order, Outcome, Reason, Received,
         message::{FrameReport, Identity, LaneReport, Motors, Telemetry, TimedSetpoint},
     },
-    math::sqrt,
-    model::{Model, Refusal},
     types::{MotorCommand, Reference, Setpoint, State, Tick},
 };
 

@@ -3,10 +3,10 @@
 use nalgebra::Vector3;
 
 use super::{Event, Header, answer};
+use impromptu_firmware::{adapter::Lanes, model::Model};
+
 use crate::{
-    adapter::Lanes,
     flight::Settings,
-    model::Model,
     types::{MotorCommand, Reference, Setpoint, State},
 };
 

@@ -3,7 +3,9 @@
 use nalgebra::{Matrix4, Vector3, Vector4};
 
 use super::Airframe;
-use crate::{math, types::MotorCommand};
+use impromptu_firmware::math;
+
+use crate::types::MotorCommand;
 
 /// Inverse of the map from rotor thrusts to collective thrust and moment.
 #[derive(Clone, Debug)]

@@ -3,14 +3,14 @@
 //! *in* setpoints, states and references; *out* channel arrays; *never* another order than the tables say;
 //! *source* Zhou 2017, section V-A (position and velocity references out; position, velocity, attitude, rates in).
 
-use nalgebra::Vector3;
-
-use crate::{
+use impromptu_firmware::{
     math::{coarse_asin, coarse_atan2},
     model::{Channel, Channels},
     preview::EndRule,
-    types::{Reference, Setpoint, State},
 };
+use nalgebra::Vector3;
+
+use crate::types::{Reference, Setpoint, State};
 
 /// Desired channels: position, velocity, acceleration, yaw.
 pub const DESIRED: usize = 10;

@@ -6,9 +6,9 @@
 mod upload;
 
 use heapless::Vec;
+use impromptu_firmware::adapter::{Inference, Job};
 
 use crate::{
-    adapter::{Inference, Job},
     autopilot::{Autopilot, Meters, Reaction},
     link::{
         Command, Commands, FRAME, Fault, Message, Order, Outcome, Reason, Received, Receiver, Report, Sender,

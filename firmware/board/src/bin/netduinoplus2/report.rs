@@ -2,7 +2,8 @@
 
 use core::fmt::{self, Write};
 
-use impromptu_firmware::{flight::Flight, model::Model};
+use impromptu_firmware::model::Model;
+use impromptu_flight::flight::Flight;
 
 use crate::instruments::StageCost;
 

@@ -3,8 +3,9 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::{RECORD, RecordingError};
+use impromptu_firmware::adapter::Lanes;
+
 use crate::{
-    adapter::Lanes,
     flight::Flight,
     types::{Setpoint, State},
 };

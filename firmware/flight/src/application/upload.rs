@@ -3,12 +3,13 @@
 //! *in* the link's model commands; *out* words for a mailbox, and back, and the outcome once carried out; *never* other bytes than were
 //! sent; *source* ours.
 
-use crate::{
-    link::{CHUNK, Command, Outcome, Reason, message::ModelChunk},
+use impromptu_firmware::{
     model::{Model, Refusal},
     network::Scratch,
     storage::{Arming, Slot, StorageError, Uploader},
 };
+
+use crate::link::{CHUNK, Command, Outcome, Reason, message::ModelChunk};
 
 /// Words of an upload in a mailbox: kind, sequence and length; two numbers; the bytes.
 pub const WORDS: usize = 3 + CHUNK / 4;
@@ -154,14 +155,14 @@ pub fn outcome_from_words(words: [u32; 2]) -> Option<Outcome> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        link::outcome::ModelFault,
+    use crate::link::outcome::ModelFault;
+    use impromptu_firmware::{
         model::file,
         storage::{self, RamFlash},
     };
     use proptest::prelude::*;
 
-    const MODEL: &[u8] = include_bytes!("../../../tests/golden/models/int8-lane.model");
+    const MODEL: &[u8] = include_bytes!("../../../../tests/golden/models/int8-lane.model");
 
     /// The command's outcome, by way of both mailboxes.
     fn obey<S: Slot>(uploader: &mut Uploader<S>, command: Command<'_>) -> Outcome {

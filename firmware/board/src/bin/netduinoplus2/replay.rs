@@ -6,9 +6,11 @@ use core::{fmt, hint::black_box};
 
 use impromptu_firmware::{
     adapter::Lanes,
-    flight::Flight,
     model::{Model, Refusal},
     network::Scratch,
+};
+use impromptu_flight::{
+    flight::Flight,
     replay::{Event, HEADER, Header, RECORD, RecordingError, answer},
     types::{MotorCommand, State, Tick},
 };

@@ -10,10 +10,11 @@ use super::{
     message::{Command, Inertial, ModelChunk, Motors, Position, Report, Telemetry, TimedSetpoint},
     outcome::Reason,
 };
+use impromptu_firmware::math;
+
 use crate::{
     control::{Airframe, AttitudeGains, PositionGains},
     flight::{Rates, Settings},
-    math,
 };
 
 /// How far from 1 the length of an attitude's quaternion may be.

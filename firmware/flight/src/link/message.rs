@@ -9,7 +9,9 @@ mod report;
 use serde::{Deserialize, Serialize};
 
 use super::{check::Message, outcome::Outcome};
-use crate::{adapter::Lanes, flight::Settings};
+use impromptu_firmware::adapter::Lanes;
+
+use crate::flight::Settings;
 
 pub use command::{Inertial, ModelChunk, Position, TimedSetpoint};
 pub use report::{FlyingModel, FrameReport, Identity, LaneReport, Motors, TRIP_REASONS, Telemetry};

@@ -8,8 +8,9 @@ use super::{
     },
     outcome::ModelFault,
 };
+use impromptu_firmware::adapter::Lanes;
+
 use crate::{
-    adapter::Lanes,
     control::{Airframe, AttitudeGains, PositionGains},
     flight::{Rates, Settings},
 };

@@ -1,7 +1,7 @@
 //! The emulated board: an STM32F405, as QEMU's `netduinoplus2`, flies a recorded flight again.
 //!
 //! - in: the model file that `IMPROMPTU_MODEL` named when this was built (none: the baseline alone), read in place from flash;
-//!   `recording.bin` in the folder where the emulator was started ([`impromptu_firmware::replay`]), read record by record
+//!   `recording.bin` in the folder where the emulator was started ([`impromptu_flight::replay`]), read record by record
 //! - out: `answers.bin` beside it, and one line of JSON on standard output: instructions for each stage, depth of the stack
 //! - never: touches clocks or pins. QEMU's RCC reads 0, so waiting for a crystal would never end. The time to read or write a
 //!   file is never part of a stage
