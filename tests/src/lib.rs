@@ -8,5 +8,6 @@ pub mod elf;
 pub mod golden;
 pub mod link;
 pub mod mcu;
+pub mod structure;
 
 pub use impromptu_host_sim::emulator;

@@ -16,6 +16,7 @@ pub mod function;
 pub mod graph;
 pub mod instruction;
 pub mod proof;
+pub mod reach;
 
 use std::{
     collections::{BTreeMap, BTreeSet},

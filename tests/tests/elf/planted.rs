@@ -5,8 +5,9 @@ use std::sync::LazyLock;
 use impromptu_tests::{
     elf::{
         Elf,
-        graph::{CallGraph, EXCEPTION_FRAME},
+        graph::CallGraph,
         proof::{Finding, Proof},
+        reach::EXCEPTION_FRAME,
     },
     emulator::{FIRMWARE, build_firmware},
 };
