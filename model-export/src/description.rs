@@ -156,8 +156,8 @@ pub struct MonitorAxisDescription {
     pub error: (u8, u8),
     /// Indices into [`Description::outputs`]: the corrections that move the measured channel.
     pub inputs: Vec<u8>,
-    /// For each input the mean of the measured channel over each monitor tick, newest first, after a correction of 1 that lasts one
-    /// monitor tick.
+    /// For each input the mean of the measured channel over each monitor tick, newest first, after a correction of 1 that lasts
+    /// one monitor tick.
     pub taps: Vec<Vec<f32>>,
 }
 

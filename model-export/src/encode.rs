@@ -196,8 +196,8 @@ fn monitor(description: &Description, blob: &mut BlobWriter) -> Result<Option<Mo
     Ok(Some(MonitorLayout { divisor: monitor.divisor, taps: taps as u8, promise: monitor.promise, axes }))
 }
 
-/// The bytes of a model file. `calibration` are rows of features in physical units: ranges of the integer network and probes come from
-/// them. A description without a network (`None`) makes a file with the feedback lane alone.
+/// The bytes of a model file. `calibration` are rows of features in physical units: ranges of the integer network and probes come
+/// from them. A description without a network (`None`) makes a file with the feedback lane alone.
 ///
 /// # Errors
 /// If parts do not fit together, or the firmware would refuse the file.

@@ -1,7 +1,7 @@
 //! What a model file says of itself, as owned data: for people as text, for programs as JSON.
 //!
-//! *in* a checked [`Model`]; *out* everything of its card but bulk numbers, indices replaced by names; *never* a number that the file
-//! does not hold or imply.
+//! *in* a checked [`Model`]; *out* everything of its card but bulk numbers, indices replaced by names; *never* a number that the
+//! file does not hold or imply.
 
 mod text;
 

@@ -1,4 +1,5 @@
-//! The receivers of the link under any bytes on stable Rust; `tests/fuzz` does the same under libFuzzer, which looks where it has not been.
+//! The receivers of the link under any bytes on stable Rust; `tests/fuzz` does the same under libFuzzer, which looks where it has
+//! not been.
 
 use impromptu_tests::link::{SEPARATOR, survive};
 use rand::{RngExt, SeedableRng};

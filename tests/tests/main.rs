@@ -13,7 +13,6 @@
 //! - [`link`]: any bytes on the link are refused or messages, never a panic;
 //! - [`processor`]: control is never late, whatever the network takes; the processor's share; late inferences;
 //! - [`pil`]: the flashed binary flies the plant, bit for bit, through good lines and bad ones;
-//! - [`unsafe_code`]: there is none but those kernels, each block with its reason;
 //! - [`upload`]: a model goes over the link into the flash, and flies from the next start on.
 //!
 //! The parts have tests of their own: plant against an independent simulator and every generator and parser in `host-sim`, model
@@ -32,5 +31,4 @@ mod link;
 mod mcu;
 mod pil;
 mod processor;
-mod unsafe_code;
 mod upload;

@@ -7,7 +7,10 @@ use clap::Args;
 use impromptu_firmware::model::Model;
 use serde::Serialize;
 
-use super::{Format, beside, read};
+use super::{
+    files::{beside, read},
+    format::Format,
+};
 use crate::{
     FloatNetwork, rows,
     verify::{Comparison, compare},

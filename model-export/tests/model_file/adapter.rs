@@ -81,7 +81,11 @@ proptest! {
 
     /// Off is the desired reference to the bit: never switched on, and some time after having been on.
     #[test]
-    fn bypass_is_bit_identical(seed in any::<u64>(), patterns in proptest::collection::vec(any::<[u32; 2]>(), 8), was_on in any::<bool>()) {
+    fn bypass_is_bit_identical(
+        seed in any::<u64>(),
+        patterns in proptest::collection::vec(any::<[u32; 2]>(), 8),
+        was_on in any::<bool>(),
+    ) {
         let (description, bytes) = violent(seed, Interpolation::Linear);
         let pattern = |tick: i32| patterns[tick.rem_euclid(8) as usize].map(f32::from_bits);
         // Any bits at all while off, negative zero and NaN among them; numbers while on.
@@ -102,7 +106,10 @@ proptest! {
         seed in any::<u64>(),
         linear in any::<bool>(),
         raw in proptest::collection::vec(any::<[u32; 2]>(), 16),
-        huge in proptest::collection::vec(prop::sample::select(vec![1e30f32, -1e30, f32::MAX, f32::MIN, f32::NAN, f32::INFINITY, 0.0]), 16),
+        huge in proptest::collection::vec(
+            prop::sample::select(vec![1e30f32, -1e30, f32::MAX, f32::MIN, f32::NAN, f32::INFINITY, 0.0]),
+            16,
+        ),
         switches in any::<u64>(),
     ) {
         let (description, bytes) = violent(seed, if linear { Interpolation::Linear } else { Interpolation::Hold });

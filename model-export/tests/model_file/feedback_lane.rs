@@ -98,7 +98,8 @@ proptest! {
     }
 }
 
-/// Where much is desired, or where the loop has strayed, the fast clamp shrinks by 1 / (1 + v²); it comes back as the peak decays.
+/// Where much is desired, or where the loop has strayed, the fast clamp shrinks by 1 / (1 + v²); it comes back as the peak
+/// decays.
 #[test]
 fn authority_falls_with_what_is_desired_and_with_the_error() {
     let cautious = |error_scale| {

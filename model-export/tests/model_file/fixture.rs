@@ -37,7 +37,8 @@ fn channel(name: &str, unit: &str, end: EndRule) -> ChannelDescription {
     ChannelDescription { name: name.into(), unit: unit.into(), frame: "world ENU".into(), end }
 }
 
-/// Position and velocity along one axis, desired, measured and as a reference; one window of desired positions; both references corrected.
+/// Position and velocity along one axis, desired, measured and as a reference; one window of desired positions; both references
+/// corrected.
 pub(crate) fn description(window: usize) -> Description {
     let signal = vec![channel("position", "m", EndRule::Hold), channel("velocity", "m/s", EndRule::Zero)];
     let feature = |offset: usize| Feature {

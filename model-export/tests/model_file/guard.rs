@@ -236,8 +236,8 @@ fn inferences_that_come_too_late_trip_the_network_alone_until_they_are_in_time()
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(60))]
 
-    /// Any bits as measurements and ages: finite corrections, at most one trip of a lane in a hold time, and the baseline's bits where no
-    /// lane may act and the fade is over.
+    /// Any bits as measurements and ages: finite corrections, at most one trip of a lane in a hold time, and the baseline's bits
+    /// where no lane may act and the fade is over.
     #[test]
     fn whatever_comes_in_a_lane_trips_at_most_once_in_a_hold_time(
         raw in proptest::collection::vec(any::<[u32; 2]>(), 16),
@@ -249,14 +249,16 @@ proptest! {
     ) {
         let doing = |tick: i32| {
             let at = (tick / period).rem_euclid(16) as usize;
-            let measured = if (bad >> at) & 1 == 1 && tick % 5 == 0 { raw[at].map(f32::from_bits) } else { [1.0 + small[at], small[15 - at]] };
+            let damaged = (bad >> at) & 1 == 1 && tick % 5 == 0;
+            let measured = if damaged { raw[at].map(f32::from_bits) } else { [1.0 + small[at], small[15 - at]] };
             Doing { measured, age: ages[at % 8], ..calm(Lanes::BOTH) }
         };
         let settings = GuardSettings { hold_s: 0.5, ..GuardSettings::default() };
         let flight = fly(guarded(), [correction, 0.1], settings, 900, doing);
         prop_assert!(flight.iter().all(|tick| tick.correction.iter().all(|value| value.is_finite())));
         for lane in 0..2 {
-            let times: Vec<usize> = (1..flight.len()).filter(|&at| flight[at].trips.by_lane()[lane] > flight[at - 1].trips.by_lane()[lane]).collect();
+            let trips = |at: usize| flight[at].trips.by_lane()[lane];
+            let times: Vec<usize> = (1..flight.len()).filter(|&at| trips(at) > trips(at - 1)).collect();
             prop_assert!(times.windows(2).all(|pair| pair[1] - pair[0] >= 50), "{times:?}");
         }
         // 15 ticks of handing over and the slew's longest way.

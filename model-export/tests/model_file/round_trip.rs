@@ -56,8 +56,9 @@ proptest! {
         }
     }
 
-    /// int8 weights are off by at most 1/254 of the row's largest: about 0.4 % of a row's sum. Stated: 1 % of the output's RMS for one
-    /// layer and half a percent more for each further one (measured over such networks: 0.4 % in the mean, 1.0 % at worst).
+    /// int8 weights are off by at most 1/254 of the row's largest: about 0.4 % of a row's sum. Stated: 1 % of the output's RMS
+    /// for one layer and half a percent more for each further one (measured over such networks: 0.4 % in the mean, 1.0 % at
+    /// worst).
     #[test]
     fn int8_is_close(seed in any::<u64>(), inputs in 4usize..80, hidden in hidden(), skip in any::<bool>()) {
         let mut numbers = Numbers(seed);
