@@ -73,7 +73,7 @@ fn description(inputs: usize, outputs: usize) -> Description {
             .map(|channel| impromptu_firmware::model::Output { channel: channel as u8, limit: 1.0, slew: 1.0 })
             .collect(),
         envelope: vec![(-1.0, 1.0); inputs],
-        lane: None,
+        feedback_lane: None,
         monitor: None,
     }
 }

@@ -167,8 +167,10 @@ pub struct MonitorAxisDescription {
 pub struct MonitorDescription {
     /// Reference ticks in a monitor tick.
     pub divisor: u16,
-    /// RMS over all axes of the error that validation flights showed with the add-on, in the errors' unit.
-    pub promise: f32,
+    /// RMS over all axes of the error that validation flights showed with the add-on, in the errors' unit. Older files call
+    /// it `promise`.
+    #[serde(alias = "promise")]
+    pub validated_rms: f32,
     /// Axes; their errors have one unit.
     pub axes: Vec<MonitorAxisDescription>,
 }
@@ -191,8 +193,9 @@ pub struct Description {
     pub outputs: Vec<Output>,
     /// Smallest and largest value of each feature in training.
     pub envelope: Vec<(f32, f32)>,
-    /// Feedback lane, if there is one.
-    pub lane: Option<LaneDescription>,
+    /// Feedback lane, if there is one. Older files call it `lane`.
+    #[serde(alias = "lane")]
+    pub feedback_lane: Option<LaneDescription>,
     /// The loop's response, if it is known: without it the guard cannot judge by evidence.
     #[serde(default)]
     pub monitor: Option<MonitorDescription>,

@@ -136,7 +136,7 @@ fn an_aggressive_feedback_lane_in_a_late_loop_is_handed_over_in_time() {
             error_scale: 10.0,
             ..recipe.clone()
         };
-        let with = |lane: &LaneDescription| Description { lane: Some(lane.clone()), ..description.clone() };
+        let with = |lane: &LaneDescription| Description { feedback_lane: Some(lane.clone()), ..description.clone() };
         let lane = strongest_lane(&wild, &plant, &logs, &one, SEED, &|lane| model(&with(lane))).expect("a lane");
         let mut open = with(&lane.lane);
         open.outputs.iter_mut().for_each(|output| (output.limit, output.slew) = (output.limit + 0.5, output.slew + 0.1));
@@ -158,7 +158,7 @@ fn a_network_with_wrong_weights_is_handed_over_in_time() {
         let plant = plant(vehicle, "lab");
         let trajectories = strokes(SEED, 12, 1.0, plant.rate_hz()).expect("strokes");
         let model = |description: &Description, network: &FloatNetwork| {
-            encode(&Description { lane: None, ..description.clone() }, Some(network), Precision::Float, &[]).expect("a model")
+            encode(&Description { feedback_lane: None, ..description.clone() }, Some(network), Precision::Float, &[]).expect("a model")
         };
         let (description, network) = parts(other, "lab");
         let name = format!("weights of {other} on {vehicle}");

@@ -30,9 +30,9 @@ struct Tick {
 fn guarded() -> Description {
     let mut description = description(1);
     description.timing.fade_s = 0.2;
-    description.lane = Some(lane([vec![-0.5], vec![0.0]], vec![0.0], 0.0));
+    description.feedback_lane = Some(lane([vec![-0.5], vec![0.0]], vec![0.0], 0.0));
     let axis = MonitorAxisDescription { error: (0, 0), inputs: vec![0], taps: vec![vec![1.0]] };
-    description.monitor = Some(MonitorDescription { divisor: 10, promise: 0.01, axes: vec![axis] });
+    description.monitor = Some(MonitorDescription { divisor: 10, validated_rms: 0.01, axes: vec![axis] });
     description
 }
 
@@ -126,7 +126,7 @@ fn each_lane_trips_alone() {
     let swing = |tick: i32| Doing { measured: [1.0 - if (tick / 20) % 2 == 0 { 0.1 } else { -0.1 }, 0.0], ..calm(Lanes::BOTH) };
     let mut description = guarded();
     // Of the opposite sign: the measured swing is what the lane makes.
-    description.lane = Some(lane([vec![0.5], vec![0.0]], vec![0.0], 0.0));
+    description.feedback_lane = Some(lane([vec![0.5], vec![0.0]], vec![0.0], 0.0));
     description.monitor.as_mut().unwrap().axes[0].taps = vec![vec![2.0]];
     let flight = fly(description, [0.0, 0.0], GuardSettings::default(), 200, swing);
     assert_eq!(flight[199].trips, only(Trip::Evidence, [0, 1]));
@@ -151,7 +151,7 @@ fn old_measurements_and_lasting_limits_trip() {
     // A network that asks for twice the limit.
     let mut description = guarded();
     description.monitor = None;
-    description.lane = None;
+    description.feedback_lane = None;
     description.features.truncate(1);
     let mut tight = description.clone();
     tight.outputs[0].slew = 1e-4;
@@ -170,7 +170,7 @@ fn old_measurements_and_lasting_limits_trip() {
 fn what_the_evidence_speaks_against_again_and_again_stays_off_until_it_is_armed() {
     // The loop swings whenever the lane acts, and is calm half a second later.
     let mut description = guarded();
-    description.lane = Some(lane([vec![0.5], vec![0.0]], vec![0.0], 0.0));
+    description.feedback_lane = Some(lane([vec![0.5], vec![0.0]], vec![0.0], 0.0));
     description.monitor.as_mut().unwrap().axes[0].taps = vec![vec![2.0]];
     let lanes = |tick: i32| if (2500..2510).contains(&tick) { Lanes::NONE } else { Lanes { network: false, feedback: true } };
     let doing = |tick: i32| Doing { measured: [1.0 - if (tick / 20) % 2 == 0 { 0.1 } else { -0.1 }, 0.0], ..calm(lanes(tick)) };
