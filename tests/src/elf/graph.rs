@@ -1,7 +1,7 @@
 //! Which function calls which.
 //!
-//! *in* a binary, and where indirect calls may lead; *out* every function with its calls; *never* a call to a function that is
-//! not in the graph; *source* the functions as [`super::function`] walks them.
+//! *in* a binary, and where indirect calls may lead; *out* every function with its calls; *never* a call to a function that is not in
+//! the graph; *source* the functions as [`super::function`] walks them.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -13,8 +13,7 @@ use super::{
     proof::Proof,
 };
 
-/// What the core stacks for an exception while the floating-point unit is in use (26 words), and what it may add to align the
-/// frame.
+/// What the core stacks for an exception while the floating-point unit is in use (26 words), and what it may add to align the frame.
 pub const EXCEPTION_FRAME: u32 = 104 + 4;
 
 /// The calls of a binary.
@@ -108,8 +107,8 @@ impl<'a> CallGraph<'a> {
         self.from_roots_except(roots, &[])
     }
 
-    /// [`CallGraph::from_roots`], without what is called by the functions with `exceptions` in their names: what those reach is
-    /// to be told apart. They have no stack then, so [`Proof::stack_bytes`] is no bound.
+    /// [`CallGraph::from_roots`], without what is called by the functions with `exceptions` in their names: what those reach is to be
+    /// told apart. They have no stack then, so [`Proof::stack_bytes`] is no bound.
     ///
     /// # Errors
     /// If a root or an exception is not there.
@@ -130,8 +129,8 @@ impl<'a> CallGraph<'a> {
         Ok(Proof { graph: self, roots, callers })
     }
 
-    /// Most stack, bytes, along a chain of callers, each called by the one before it: from the entry of the first to the deepest
-    /// point of the last.
+    /// Most stack, bytes, along a chain of callers, each called by the one before it: from the entry of the first to the deepest point of
+    /// the last.
     ///
     /// # Errors
     /// If one of them does not call the next, or if the last one's stack has no bound ([`Proof::stack_bytes`]).
@@ -147,9 +146,8 @@ impl<'a> CallGraph<'a> {
         Ok(bytes)
     }
 
-    /// Most stack, bytes, of a program with interrupts: `thread` are its entries (`Reset`, `main`), `levels` the handlers of each
-    /// priority in use. A handler is interrupted by those of other levels only, so one of each can be active at a time, each with
-    /// its exception frame.
+    /// Most stack, bytes, of a program with interrupts: `thread` are its entries (`Reset`, `main`), `levels` the handlers of each priority in
+    /// use. A handler is interrupted by those of other levels only, so one of each can be active at a time, each with its exception frame.
     ///
     /// # Errors
     /// If one of them has no bound ([`Proof::stack_bytes`]).
@@ -157,8 +155,8 @@ impl<'a> CallGraph<'a> {
         self.nested_stack_bytes_except(thread, levels, &[])
     }
 
-    /// [`CallGraph::nested_stack_bytes`] without what is called by the functions with `exceptions` in their names, which have no
-    /// stack then: those that end the program, or have ended before the interrupts are on.
+    /// [`CallGraph::nested_stack_bytes`] without what is called by the functions with `exceptions` in their names, which have no stack then: those
+    /// that end the program, or have ended before the interrupts are on.
     ///
     /// # Errors
     /// If one of them has no bound, or an exception is not there.
