@@ -24,7 +24,17 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir "$work/src"
 echo '#![no_std]' > "$work/src/lib.rs"
-printf '[package]\nname = "empty"\nversion = "0.0.0"\nedition = "2021"\n[workspace]\n[profile.release]\ndebug = "line-tables-only"\ncodegen-units = 1\npanic = "abort"\n' > "$work/Cargo.toml"
+cat > "$work/Cargo.toml" <<'END'
+[package]
+name = "empty"
+version = "0.0.0"
+edition = "2021"
+[workspace]
+[profile.release]
+debug = "line-tables-only"
+codegen-units = 1
+panic = "abort"
+END
 # Bit code is kept so that a link with whole-program optimisation can inline `core`; no local path gets into the binaries.
 flags=$(printf '%s\037' -Cembed-bitcode=yes -Zforce-unstable-if-unmarked "--remap-path-prefix=$(readlink -f $source)=/rustc")
 (

@@ -9,7 +9,7 @@
 //!
 //! ```
 //! use impromptu_firmware::{network::Scratch, storage::{self, Arming, RamFlash}};
-//! # let file: &[u8] = include_bytes!("../../tests/golden/models/int8-lane.model");
+//! # let file: &[u8] = include_bytes!("../tests/models/int8-lane.model");
 //! # let checksum = impromptu_firmware::model::file::checksum(file);
 //!
 //! let mut slots = [RamFlash::<4096>::new(), RamFlash::new()];

@@ -1,8 +1,7 @@
-//! Time of one Runge-Kutta step of the plant, for each vehicle, and of `peng_quad`'s when it is built in:
-//! `cargo bench -p impromptu-host-sim --bench plant --features peng-quad`.
+//! Time of one Runge-Kutta step of the plant, for each vehicle, and of the whole closed loop.
 //!
-//! Criterion's throughput is vehicle-steps a second (Melem/s: million steps a second and core). `peng_quad` computes in
-//! f32 a rigid body under a given thrust and moment: no motors, rotors, wind or saturation.
+//! Criterion's throughput is vehicle-steps a second (Melem/s: million steps a second and core). `tests/peers/plant-benchmark`
+//! measures another simulator.
 
 use std::hint::black_box;
 
@@ -61,31 +60,5 @@ fn closed_loop(criterion: &mut Criterion) {
     group.finish();
 }
 
-#[cfg(feature = "peng-quad")]
-fn peng_quad(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("peng_quad");
-    group.throughput(Throughput::Elements(RESTART as u64));
-    let vehicle = Vehicle::named("crazyflie").expect("a built-in vehicle");
-    let inertia: Vec<f32> = vehicle.inertia.matrix().iter().map(|value| *value as f32).collect();
-    let inertia = <[f32; 9]>::try_from(inertia).expect("nine entries");
-    let (mass, gravity) = (vehicle.mass as f32, GRAVITY as f32);
-    let mut quadrotor = peng_quad::Quadrotor::new(STEP as f32, mass, gravity, 0.001, inertia).expect("an invertible inertia");
-    let start = quadrotor.get_state();
-    let torque = Default::default();
-    group.bench_function("Runge-Kutta step of 1 flight, f32", |bencher| {
-        bencher.iter(|| {
-            quadrotor.set_state(&start);
-            for _ in 0..RESTART {
-                quadrotor.update_dynamics_with_controls_rk4(black_box(mass * gravity), &torque);
-            }
-            quadrotor.get_state()
-        });
-    });
-    group.finish();
-}
-
-#[cfg(feature = "peng-quad")]
-criterion_group!(benches, plant, closed_loop, peng_quad);
-#[cfg(not(feature = "peng-quad"))]
 criterion_group!(benches, plant, closed_loop);
 criterion_main!(benches);

@@ -71,6 +71,17 @@ impl Output {
 /// Once for each environment in a run of the tests. Cargo works in a target folder of its own, so that it neither waits for the build
 /// that runs the tests nor disturbs it.
 pub fn build_firmware(package: &str, bin: &str, profile: &str, environment: &[(&str, &str)]) -> Result<PathBuf> {
+    build_firmware_of(workspace(), package, bin, profile, environment)
+}
+
+/// [`build_firmware`] of a package in the Cargo workspace `root`.
+pub fn build_firmware_of(
+    root: &Path,
+    package: &str,
+    bin: &str,
+    profile: &str,
+    environment: &[(&str, &str)],
+) -> Result<PathBuf> {
     static BUILT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
     let folder = target_folder();
     let mut variant = DefaultHasher::new();
@@ -78,20 +89,26 @@ pub fn build_firmware(package: &str, bin: &str, profile: &str, environment: &[(&
     let elf = folder.join(format!("{bin}-{:016x}.elf", variant.finish()));
     let mut built = BUILT.lock().unwrap_or_else(PoisonError::into_inner);
     if !built.contains(&elf) {
-        build(package, bin, profile, environment, &folder, &elf)?;
+        build(root, [package, bin, profile], environment, &folder, &elf)?;
         built.insert(elf.clone());
     }
     Ok(elf)
 }
 
-fn build(package: &str, bin: &str, profile: &str, environment: &[(&str, &str)], folder: &Path, elf: &Path) -> Result<()> {
+fn build(
+    root: &Path,
+    [package, bin, profile]: [&str; 3],
+    environment: &[(&str, &str)],
+    folder: &Path,
+    elf: &Path,
+) -> Result<()> {
     require_target()?;
     fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
     // Held until the ELF is copied: a build with another environment, in another process, writes to the same name.
     let lock = File::create(folder.join("emulator.lock"))?;
     lock.lock()?;
     let built = tool("cargo")
-        .current_dir(workspace())
+        .current_dir(root)
         .args(["build", "--package", package, "--bin", bin])
         .args(["--target", TARGET, "--profile", profile, "--locked"])
         .arg("--target-dir")

@@ -1,6 +1,6 @@
-//! Rows evaluated in batches against the same rows one by one, in one run: float network and int8 model of the 12-128x4-6 net and of
-//! a 3-20-20-1 tanh net. The lines before Criterion's print the ratio of the fastest of many passes, which other work on the machine
-//! disturbs least.
+//! Rows evaluated in batches against the same rows one by one, in one run: float network and int8 model of the 12-128x4-6 net and
+//! of a 3-20-20-1 tanh net. The lines before Criterion's print the ratio of the fastest of many passes, which other work on the
+//! machine disturbs least.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use impromptu_firmware::{
@@ -73,7 +73,7 @@ fn description(inputs: usize, outputs: usize) -> Description {
             .map(|channel| impromptu_firmware::model::Output { channel: channel as u8, limit: 1.0, slew: 1.0 })
             .collect(),
         envelope: vec![(-1.0, 1.0); inputs],
-        lane: None,
+        feedback_lane: None,
         monitor: None,
     }
 }

@@ -1,9 +1,11 @@
 //! The command line: `export`, `inspect`, `verify`.
 //!
-//! *in* arguments; *out* results on stdout, messages on stderr, an exit code; *never* a file that is half written, or a file replaced when
-//! something failed.
+//! *in* arguments; *out* results on stdout, messages on stderr, an exit code; *never* a file that is half written, or a file
+//! replaced when something failed.
 
 mod export;
+mod files;
+mod format;
 mod verify;
 
 use std::{
@@ -13,10 +15,10 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use clap::{Parser, Subcommand, ValueEnum};
+use clap::{Parser, Subcommand};
 use impromptu_firmware::model::Model;
-use serde::Serialize;
 
+use self::{export::Export, files::read, format::Format, verify::Verify};
 use crate::inspection::Inspection;
 
 /// Exit code: all is well.
@@ -53,7 +55,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Writes a model file from a float network and its description.
-    Export(export::Export),
+    Export(Export),
     /// Prints what a model file says of itself.
     Inspect {
         /// Model file.
@@ -63,28 +65,7 @@ enum Command {
         format: Format,
     },
     /// Re-runs a model file's probes, and compares it with the float network over rows of features.
-    Verify(verify::Verify),
-}
-
-/// How results are printed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-enum Format {
-    /// For people.
-    #[default]
-    Text,
-    /// One JSON document.
-    Json,
-}
-
-impl Format {
-    /// Prints a result; `text` is made only if it is wanted.
-    fn print(self, out: &mut dyn Write, result: &impl Serialize, text: impl FnOnce() -> String) -> Result<()> {
-        match self {
-            Self::Text => out.write_all(text().as_bytes())?,
-            Self::Json => writeln!(out, "{}", serde_json::to_string_pretty(result)?)?,
-        }
-        Ok(out.flush()?)
-    }
+    Verify(Verify),
 }
 
 /// Runs the program on `arguments` (the first of them is its name). Returns the exit code.
@@ -124,13 +105,4 @@ fn inspect(file: &Path, format: Format, out: &mut dyn Write) -> Result<()> {
     let model = Model::from_bytes(&bytes).with_context(|| file.display().to_string())?;
     let inspection = Inspection::new(&model, &bytes);
     format.print(out, &inspection, || inspection.to_string())
-}
-
-fn read(path: &Path) -> Result<Vec<u8>> {
-    std::fs::read(path).with_context(|| path.display().to_string())
-}
-
-/// `NAME.safetensors` to `NAME.extension`.
-fn beside(network: &Path, extension: &str) -> PathBuf {
-    network.with_extension(extension)
 }

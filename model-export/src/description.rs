@@ -156,8 +156,8 @@ pub struct MonitorAxisDescription {
     pub error: (u8, u8),
     /// Indices into [`Description::outputs`]: the corrections that move the measured channel.
     pub inputs: Vec<u8>,
-    /// For each input the mean of the measured channel over each monitor tick, newest first, after a correction of 1 that lasts one
-    /// monitor tick.
+    /// For each input the mean of the measured channel over each monitor tick, newest first, after a correction of 1 that lasts
+    /// one monitor tick.
     pub taps: Vec<Vec<f32>>,
 }
 
@@ -167,8 +167,10 @@ pub struct MonitorAxisDescription {
 pub struct MonitorDescription {
     /// Reference ticks in a monitor tick.
     pub divisor: u16,
-    /// RMS over all axes of the error that validation flights showed with the add-on, in the errors' unit.
-    pub promise: f32,
+    /// RMS over all axes of the error that validation flights showed with the add-on, in the errors' unit. Older files call
+    /// it `promise`.
+    #[serde(alias = "promise")]
+    pub validated_rms: f32,
     /// Axes; their errors have one unit.
     pub axes: Vec<MonitorAxisDescription>,
 }
@@ -191,8 +193,9 @@ pub struct Description {
     pub outputs: Vec<Output>,
     /// Smallest and largest value of each feature in training.
     pub envelope: Vec<(f32, f32)>,
-    /// Feedback lane, if there is one.
-    pub lane: Option<LaneDescription>,
+    /// Feedback lane, if there is one. Older files call it `lane`.
+    #[serde(alias = "lane")]
+    pub feedback_lane: Option<LaneDescription>,
     /// The loop's response, if it is known: without it the guard cannot judge by evidence.
     #[serde(default)]
     pub monitor: Option<MonitorDescription>,

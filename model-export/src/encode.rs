@@ -144,7 +144,7 @@ fn channels<'a, const N: usize>(
 }
 
 fn lane(description: &Description, blob: &mut BlobWriter) -> Result<Option<LaneLayout>, ExportError> {
-    let Some(lane) = &description.lane else { return Ok(None) };
+    let Some(lane) = &description.feedback_lane else { return Ok(None) };
     let lags = lane.axes.first().map_or(0, |axis| axis.output_coefficients.len());
     within(lags, "lags of the feedback lane", model::MAX_LAGS)?;
     let mut axes = Vec::new();
@@ -193,11 +193,11 @@ fn monitor(description: &Description, blob: &mut BlobWriter) -> Result<Option<Mo
         });
     }
     let axes = bounded(&axes, "monitor axes")?;
-    Ok(Some(MonitorLayout { divisor: monitor.divisor, taps: taps as u8, promise: monitor.promise, axes }))
+    Ok(Some(MonitorLayout { divisor: monitor.divisor, taps: taps as u8, promise: monitor.validated_rms, axes }))
 }
 
-/// The bytes of a model file. `calibration` are rows of features in physical units: ranges of the integer network and probes come from
-/// them. A description without a network (`None`) makes a file with the feedback lane alone.
+/// The bytes of a model file. `calibration` are rows of features in physical units: ranges of the integer network and probes come
+/// from them. A description without a network (`None`) makes a file with the feedback lane alone.
 ///
 /// # Errors
 /// If parts do not fit together, or the firmware would refuse the file.

@@ -38,7 +38,8 @@ pub enum ExportError {
     },
     /// Weights so large that one step of a row's accumulator is more than half a step of the pre-activation.
     #[error(
-        "layer {layer}, row {row}: weights too large for integer arithmetic: train with weight decay or export with --precision float"
+        "layer {layer}, row {row}: weights too large for integer arithmetic: \
+         train with weight decay or export with --precision float"
     )]
     Steep {
         /// Layer, from 0.

@@ -12,10 +12,13 @@
 //! Units are those of the inputs and outputs; everything between the two normalisations has none.
 
 mod file;
+mod names;
 
 pub use file::{FORMAT_NAME, FORMAT_VERSION, FloatNetworkFileError};
 
 use std::collections::BTreeMap;
+
+use self::names::{is_reserved, layer_bias_name, layer_weight_name};
 
 /// The nonlinearity that a dense layer applies to each of its outputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -218,19 +221,11 @@ impl FloatNetwork {
         check_finite("output.mean", &self.output_mean)?;
         check_scale("input.scale", &self.input_scale)?;
         check_scale("output.scale", &self.output_scale)?;
-        match self.notes.keys().find(|key| file::is_reserved(key)) {
+        match self.notes.keys().find(|key| is_reserved(key)) {
             Some(key) => Err(FloatNetworkError::ReservedNote { key: key.clone() }),
             None => Ok(()),
         }
     }
-}
-
-fn layer_weight_name(index: usize) -> String {
-    format!("layer.{index}.weight")
-}
-
-fn layer_bias_name(index: usize) -> String {
-    format!("layer.{index}.bias")
 }
 
 /// `start + matrix · vector`, the matrix row-major with one row for each value of `start`.

@@ -1,7 +1,7 @@
 //! What a model file says of itself, as owned data: for people as text, for programs as JSON.
 //!
-//! *in* a checked [`Model`]; *out* everything of its card but bulk numbers, indices replaced by names; *never* a number that the file
-//! does not hold or imply.
+//! *in* a checked [`Model`]; *out* everything of its card but bulk numbers, indices replaced by names; *never* a number that the
+//! file does not hold or imply.
 
 mod text;
 
@@ -38,7 +38,7 @@ pub struct Inspection {
     /// Network lane.
     pub network: Option<InspectedNetwork>,
     /// Feedback lane.
-    pub lane: Option<InspectedLane>,
+    pub feedback_lane: Option<InspectedLane>,
     /// By what the guard judges the lanes; without it there are no trips by evidence.
     pub monitor: Option<InspectedMonitor>,
     /// Probes of the network lane; all of them gave their bits, or the file would not have been loaded.
@@ -179,7 +179,7 @@ pub struct InspectedMonitor {
     /// Time that a response to a correction lasts, s.
     pub memory_s: f32,
     /// RMS of the error that validation flights showed with the add-on, in its unit.
-    pub promise: f32,
+    pub validated_rms: f32,
     /// Unit of the errors.
     pub unit: String,
     /// Axes.
@@ -244,7 +244,7 @@ impl Inspection {
             features: features.map(|(feature, (low, high))| inspected_feature(card, feature, low, high)).collect(),
             outputs: outputs.collect(),
             network: network(model),
-            lane: lane(model),
+            feedback_lane: feedback_lane(model),
             monitor: monitor(model),
             network_probes: card.probes.count,
         }
@@ -324,13 +324,13 @@ fn monitor(model: &Model<'_>) -> Option<InspectedMonitor> {
     Some(InspectedMonitor {
         period_s,
         memory_s: period_s * monitor.taps() as f32,
-        promise: monitor.promise(),
+        validated_rms: monitor.promise(),
         unit: channel(&card.signals.measured, first).1.into(),
         axes: axes.collect(),
     })
 }
 
-fn lane(model: &Model<'_>) -> Option<InspectedLane> {
+fn feedback_lane(model: &Model<'_>) -> Option<InspectedLane> {
     let card = model.card();
     let layout = card.lane.as_ref()?;
     let axes = layout.axes.iter().map(|axis| {

@@ -7,7 +7,7 @@ use impromptu_firmware::network::{
     kernel::{Width, float_blocks, float_rows, portable::pair},
 };
 
-use crate::quantise::IntegerLayer;
+use crate::integer_network::IntegerLayer;
 
 /// Inputs of a float layer are padded to a multiple of this.
 const FLOAT_PADDING: usize = 2;

@@ -1,94 +1,36 @@
 //! Integer weights with a scale for each row, codes with a scale for each layer.
 //!
 //! - An activation's scale covers the largest magnitude that the calibration rows reach, with [`HEADROOM`].
-//! - A layer's largest input code is the largest with which no accumulator can overflow, whatever the codes: the accumulator's 32 bits are
-//!   shared by weights and codes. The firmware proves it again at load.
+//! - A layer's largest input code is the largest with which no accumulator can overflow, whatever the codes: the accumulator's 32
+//!   bits are shared by weights and codes. The firmware proves it again at load.
 //! - int8: the largest weight of a row is 127 steps. int16: weights and codes get about as many bits each.
-//! - Weights are rounded column by column, each column's error being made good by those to come ([`mod@rounding`]), on the inputs that the
-//!   quantised layers before give; the bias then takes what is left in the mean.
+//! - Weights are rounded column by column, each column's error being made good by those to come ([`mod@rounding`]), on the inputs
+//!   that the quantised layers before give; the bias then takes what is left in the mean.
 //!
-//! Bias and accumulator share the unit `s_in · s_row` of effective weights (1/256 of an int8 step). Jacob et al. 2018 (integer-arithmetic-only
-//! inference); what differs: symmetric codes of up to 16 bits, one multiplier without a shift. Frantar et al. 2023 (GPTQ) for the rounding.
+//! Bias and accumulator share the unit `s_in · s_row` of effective weights (1/256 of an int8 step). Jacob et al. 2018
+//! (integer-arithmetic-only inference); what differs: symmetric codes of up to 16 bits, one multiplier without a shift. Frantar
+//! et al. 2023 (GPTQ) for the rounding.
 
 pub mod rounding;
 
-use impromptu_firmware::network::{ROWS, TANH_INPUT_ONE, kernel::Width, requantise, tanh_code};
+use impromptu_firmware::network::{ROWS, TANH_INPUT_ONE, kernel::Width};
 use nalgebra::DMatrix;
 
 use crate::{
     batch::Batch,
     float_network::{Activation, DenseLayer, FloatNetwork},
+    integer_network::{IntegerLayer, IntegerNetwork},
 };
 
 /// Calibrated range over the largest magnitude seen.
 pub const HEADROOM: f32 = 1.25;
-/// Most that the envelope may widen the range of the inputs, over the largest magnitude seen: one outlier must not take the codes' steps
-/// from all features.
+/// Most that the envelope may widen the range of the inputs, over the largest magnitude seen: one outlier must not take the
+/// codes' steps from all features.
 const WIDEST: f32 = 4.0;
 /// Calibration rows on which weights are rounded: enough for the second moments of 256 inputs.
 const ROUNDING_ROWS: usize = 4096;
 /// Most that a row's bias may be, over its largest weight times the largest input; else the scale grows.
 const BIAS_SHARE: f64 = 2.0;
-
-/// One integer layer, rows not yet packed.
-#[derive(Clone, Debug, PartialEq)]
-pub struct IntegerLayer {
-    /// Inputs of each row.
-    pub inputs: usize,
-    /// Effective weights, row-major `[outputs padded to whole blocks][inputs padded]`. int8: with the fractions that the packing brings.
-    pub weights: Vec<i16>,
-    /// One for each output, in units of the accumulator.
-    pub bias: Vec<i32>,
-    /// Hidden layers: accumulator to next code, times 2³².
-    pub multipliers: Vec<i32>,
-    /// Last layer: accumulator to normalised output.
-    pub row_scales: Vec<f32>,
-    /// Largest magnitude of an input code.
-    pub input_limit: u16,
-    /// Activation.
-    pub activation: Activation,
-}
-
-/// The dense layers of a network in integers. The skip stays in f32: it carries nearly all of the correction and costs little.
-#[derive(Clone, Debug, PartialEq)]
-pub struct IntegerNetwork {
-    /// Factor from a normalised input to its code.
-    pub input_code: f32,
-    /// Layers.
-    pub layers: Vec<IntegerLayer>,
-}
-
-impl IntegerLayer {
-    /// Inputs of a packed row.
-    pub fn stride(&self) -> usize {
-        self.inputs.next_multiple_of(impromptu_firmware::network::INPUT_PADDING)
-    }
-
-    /// Effective weights of an output.
-    pub fn row(&self, row: usize) -> &[i16] {
-        &self.weights[row * self.stride()..][..self.inputs]
-    }
-
-    /// The exact accumulator of an output.
-    pub fn accumulator(&self, row: usize, codes: &[i16]) -> i64 {
-        let products = self.row(row).iter().zip(codes).map(|(weight, code)| i64::from(*weight) * i64::from(*code));
-        i64::from(self.bias[row]) + products.sum::<i64>()
-    }
-
-    /// A hidden layer's codes, of which `limit` is the largest: the firmware's arithmetic.
-    pub fn codes(&self, codes: &[i16], limit: u16) -> Vec<i16> {
-        let one = |row: usize| {
-            let code = requantise(self.accumulator(row, codes) as i32, self.multipliers[row]);
-            let limit_code = i32::from(limit);
-            match self.activation {
-                Activation::Relu => code.clamp(0, limit_code) as i16,
-                Activation::Linear => code.clamp(-limit_code, limit_code) as i16,
-                Activation::Tanh => tanh_code(code.clamp(i16::MIN.into(), i16::MAX.into()) as i16, limit),
-            }
-        };
-        (0..self.bias.len()).map(one).collect()
-    }
-}
 
 /// Normalised inputs of `rows` (in physical units).
 fn normalised(network: &FloatNetwork, row: &[f32]) -> Vec<f32> {
@@ -110,14 +52,15 @@ struct Inputs {
     signed: bool,
     /// Finest useful limit of their codes: the layer before has no finer steps.
     finest: f64,
-    /// For each row: those of the float layer, and those that the quantised layers before give (codes not rounded: their number of bits
-    /// follows from this layer's weights).
+    /// For each row: those of the float layer, and those that the quantised layers before give (codes not rounded: their number
+    /// of bits follows from this layer's weights).
     float: Vec<Vec<f32>>,
     quantised: Vec<Vec<f64>>,
 }
 
-/// Quantises the dense layers on the calibration rows (features in physical units). Input codes also cover the `envelope` (smallest and
-/// largest value of each feature): rows are a sample, and inputs that saturate there cost far more than finer steps gain.
+/// Quantises the dense layers on the calibration rows (features in physical units). Input codes also cover the `envelope`
+/// (smallest and largest value of each feature): rows are a sample, and inputs that saturate there cost far more than finer steps
+/// gain.
 pub fn quantise<'r>(
     network: &FloatNetwork,
     width: Width,
@@ -166,8 +109,8 @@ pub fn quantise<'r>(
     result
 }
 
-/// Accumulator to the unit in which the activation reads its argument, times 2³². At `i32::MAX` a tanh layer is too steep; `encode`
-/// refuses it.
+/// Accumulator to the unit in which the activation reads its argument, times 2³². At `i32::MAX` a tanh layer is too steep;
+/// `encode` refuses it.
 fn multipliers(activation: Activation, units: &[f64], unit_out: f64) -> Vec<i32> {
     let unit_pre = match activation {
         Activation::Tanh => 1.0 / f64::from(TANH_INPUT_ONE),
@@ -227,14 +170,15 @@ fn largest_weight(width: Width, rows: &[&[f32]], signed: bool) -> f64 {
     }
 }
 
-/// Real weight of an effective one: the largest becomes `largest`, or less where a large bias beside small weights would leave the
-/// codes no room in the accumulator.
+/// Real weight of an effective one: the largest becomes `largest`, or less where a large bias beside small weights would leave
+/// the codes no room in the accumulator.
 fn scale(row: &[f32], bias: f32, largest: f64, range: f64) -> f64 {
     let most = row.iter().fold(0.0f32, |most, weight| most.max(weight.abs()));
     (f64::from(most) / largest).max(f64::from(bias.abs()) / (BIAS_SHARE * largest * range)).max(1e-30)
 }
 
-/// Mean products of pairs of inputs. Fewer rows say less of how inputs go together: their share of the diagonal's mean is added to it.
+/// Mean products of pairs of inputs. Fewer rows say less of how inputs go together: their share of the diagonal's mean is added
+/// to it.
 fn moments(rows: &[Vec<f64>], count: usize) -> DMatrix<f64> {
     let inputs = DMatrix::from_fn(count, rows.len(), |input, row| rows[row][input]);
     let moments = &inputs * inputs.transpose() / rows.len().max(1) as f64;

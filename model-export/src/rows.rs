@@ -1,7 +1,7 @@
 //! Rows of features in CSV: what int8 is calibrated on and what float and quantised are compared over.
 //!
-//! *in* a header, then a column for each feature in the description's order and units; *out* rows of finite f32; *never* a row left out in
-//! silence: what is wrong is refused with its line and column.
+//! *in* a header, then a column for each feature in the description's order and units; *out* rows of finite f32; *never* a row
+//! left out in silence: what is wrong is refused with its line and column.
 
 use std::{
     io,

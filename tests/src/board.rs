@@ -39,7 +39,8 @@ pub fn build(model: Option<&[u8]>) -> Result<PathBuf> {
     build_firmware("impromptu-board", "netduinoplus2", FIRMWARE, &[("IMPROMPTU_MODEL", path)])
 }
 
-/// Starts the board with a recording in its folder, named after the flight `name`; gives what it printed, and the answers if it wrote any.
+/// Starts the board with a recording in its folder, named after the flight `name`; gives what it printed, and the answers if it
+/// wrote any.
 pub fn start(name: &str, model: Option<&[u8]>, recording: &[u8]) -> Result<(Output, Option<Vec<u8>>)> {
     let elf = build(model)?;
     let folder = target_folder().join("flights").join(name.replace(|c: char| !c.is_ascii_alphanumeric(), "-"));

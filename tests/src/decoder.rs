@@ -1,7 +1,7 @@
 //! What the decoder of model files must survive: any bytes, and files that are whole but for their content.
 //!
-//! *in* bytes; *out* whether a model was loaded from them and flown; *never* a panic, an overflow or a read out of bounds, whatever the
-//! bytes: that is what the fuzz target and the test on stable Rust look for.
+//! *in* bytes; *out* whether a model was loaded from them and flown; *never* a panic, an overflow or a read out of bounds,
+//! whatever the bytes: that is what the fuzz target and the test on stable Rust look for.
 
 use impromptu_firmware::{
     adapter::{Adapter, Lanes},

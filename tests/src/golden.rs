@@ -1,4 +1,7 @@
 //! Golden texts: results that must not change unnoticed, in `tests/golden/`.
+//!
+//! Instruction counts, bytes and stacks belong to one compiler, which `rust-toolchain.toml` names and which each text names again: with
+//! another one they are compared as well, and differ.
 
 use std::{
     env, fs,
@@ -30,22 +33,6 @@ pub fn compare(name: &str, text: &str) -> Result<()> {
         differences if differences.is_empty() => Ok(()),
         differences => bail!("{} differs; {UPDATE_VARIABLE}=1 accepts the new text:\n{differences}", path.display()),
     }
-}
-
-/// Compares `text`, whose second line is `compiler: …`, with the golden text `name` if that was made by the same compiler. Another
-/// compiler makes other instructions: then the text is only shown.
-///
-/// # Errors
-/// With every line that differs.
-pub fn compare_for_compiler(name: &str, compiler: &str, text: &str) -> Result<()> {
-    let pinned = read(name).ok().and_then(|text| text.lines().nth(1).map(str::to_owned));
-    if updating() || pinned.is_none_or(|pinned| pinned == format!("compiler: {compiler}")) {
-        return compare(name, text);
-    }
-    announce(&format!(
-        "NOT COMPARED: the golden counts in tests/golden/{name} belong to another compiler than {compiler}. Counted here:\n{text}"
-    ));
-    Ok(())
 }
 
 /// The golden text `name`.

@@ -1,7 +1,7 @@
 //! What the receivers of the link must survive: any bytes, and frames that are whole but for their message.
 //!
-//! *in* bytes; *out* how many messages were delivered; *never* a panic, a message whose number is not finite, or one that does not arrive
-//! again when it is sent again: that is what the fuzz target and the test on stable Rust look for.
+//! *in* bytes; *out* how many messages were delivered; *never* a panic, a message whose number is not finite, or one that does
+//! not arrive again when it is sent again: that is what the fuzz target and the test on stable Rust look for.
 
 use impromptu_flight::link::{Commands, Direction, FRAME, Message, Reason, Receiver, Reports, encode};
 use serde::{Serialize, Serializer, ser::SerializeTuple};
@@ -9,8 +9,8 @@ use serde::{Serialize, Serializer, ser::SerializeTuple};
 /// Separates the messages that are put into frames: a byte which few numbers have.
 pub const SEPARATOR: u8 = 0xff;
 
-/// Receives the bytes as they are, then each piece between two separators as the message of a frame whose header and check sum are
-/// right.
+/// Receives the bytes as they are, then each piece between two separators as the message of a frame whose header and check sum
+/// are right.
 pub fn survive(bytes: &[u8]) -> usize {
     let mut frame = [0; FRAME];
     let pieces = bytes.split(|byte| *byte == SEPARATOR).enumerate();

@@ -48,12 +48,23 @@ fn mutate(generator: &mut Xoshiro256PlusPlus, seeds: &[Vec<u8>]) -> Vec<u8> {
     bytes
 }
 
-#[test]
-fn mutated_files_are_refused_or_flown() {
+/// As many mutated files as asked for.
+fn survives(files: u32, seed: u64) {
     let seeds = seeds();
     assert!(seeds.len() >= 2 && seeds.iter().all(|seed| decoder::survive(seed)), "the seeds must load");
-    let mut generator = Xoshiro256PlusPlus::seed_from_u64(8);
-    let loaded = (0..FILES).filter(|_| decoder::survive(&mutate(&mut generator, &seeds))).count();
+    let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let loaded = (0..files).filter(|_| decoder::survive(&mutate(&mut generator, &seeds))).count();
     // Not a test of refusals alone: a good part must get through to the arithmetic.
-    assert!(loaded > FILES as usize / 20 && loaded < FILES as usize, "{loaded} of {FILES} loaded");
+    assert!(loaded > files as usize / 20 && loaded < files as usize, "{loaded} of {files} loaded");
+}
+
+#[test]
+fn mutated_files_are_refused_or_flown() {
+    survives(FILES, 8);
+}
+
+#[test]
+#[ignore = "long"]
+fn long_forty_times_as_many_mutated_files_are_refused_or_flown() {
+    survives(40 * FILES, 108);
 }

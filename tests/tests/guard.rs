@@ -1,8 +1,9 @@
-//! What the guard does when a lane does harm. With a feedback lane that oscillates and with the other vehicle's weights the error over any second
-//! stays below 1.5 times the baseline's; with opposite weights it is smaller than without the guard, but beyond that bar.
+//! What the guard does when a lane does harm. With a feedback lane that oscillates and with the other vehicle's weights the error
+//! over any second stays below 1.5 times the baseline's; with opposite weights it is smaller than without the guard, but beyond
+//! that bar.
 //!
-//! The error over a second is compared with the baseline's over the same second, or with that of its whole flight where that is larger:
-//! a second in which the baseline hovers has next to no error.
+//! The error over a second is compared with the baseline's over the same second, or with that of its whole flight where that is
+//! larger: a second in which the baseline hovers has next to no error.
 
 use impromptu_firmware::{
     adapter::Lanes,
@@ -112,8 +113,9 @@ fn compared(name: &str, plant: &Loop, trajectories: &[Trajectory], bytes: &[u8],
     outcomes
 }
 
-/// Lanes with the noise believed and full authority everywhere, in a loop 20 ms later than their logs: one with a hundredth of the effort and
-/// clamps wide open, whose good flights go astray now and then, and one without any weight on the velocity, as the pilot's was, which never flies.
+/// Lanes with the noise believed and full authority everywhere, in a loop 20 ms later than their logs: one with a hundredth of
+/// the effort and clamps wide open, whose good flights go astray now and then, and one without any weight on the velocity, as the
+/// pilot's was, which never flies.
 #[test]
 fn an_aggressive_feedback_lane_in_a_late_loop_is_handed_over_in_time() {
     let plant = plant("crazyflie", "rough");
@@ -134,7 +136,7 @@ fn an_aggressive_feedback_lane_in_a_late_loop_is_handed_over_in_time() {
             error_scale: 10.0,
             ..recipe.clone()
         };
-        let with = |lane: &LaneDescription| Description { lane: Some(lane.clone()), ..description.clone() };
+        let with = |lane: &LaneDescription| Description { feedback_lane: Some(lane.clone()), ..description.clone() };
         let lane = strongest_lane(&wild, &plant, &logs, &one, SEED, &|lane| model(&with(lane))).expect("a lane");
         let mut open = with(&lane.lane);
         open.outputs.iter_mut().for_each(|output| (output.limit, output.slew) = (output.limit + 0.5, output.slew + 0.1));
@@ -156,7 +158,7 @@ fn a_network_with_wrong_weights_is_handed_over_in_time() {
         let plant = plant(vehicle, "lab");
         let trajectories = strokes(SEED, 12, 1.0, plant.rate_hz()).expect("strokes");
         let model = |description: &Description, network: &FloatNetwork| {
-            encode(&Description { lane: None, ..description.clone() }, Some(network), Precision::Float, &[]).expect("a model")
+            encode(&Description { feedback_lane: None, ..description.clone() }, Some(network), Precision::Float, &[]).expect("a model")
         };
         let (description, network) = parts(other, "lab");
         let name = format!("weights of {other} on {vehicle}");

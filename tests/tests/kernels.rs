@@ -1,5 +1,5 @@
-//! The kernels in assembly give the bits of the portable twin, on the emulated processor and on this machine: random shapes, extreme
-//! weights, accumulators that wrap, codes that saturate, streams that are not aligned.
+//! The kernels in assembly give the bits of the portable twin, on the emulated processor and on this machine: random shapes,
+//! extreme weights, accumulators that wrap, codes that saturate, streams that are not aligned.
 
 use std::{fs, path::PathBuf, time::Duration};
 

@@ -1,4 +1,5 @@
-//! The receivers of the link under any bytes on stable Rust; `tests/fuzz` does the same under libFuzzer, which looks where it has not been.
+//! The receivers of the link under any bytes on stable Rust; `tests/fuzz` does the same under libFuzzer, which looks where it has
+//! not been.
 
 use impromptu_tests::link::{SEPARATOR, survive};
 use rand::{RngExt, SeedableRng};
@@ -7,11 +8,11 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 /// Inputs in the test.
 const INPUTS: usize = 100_000;
 
-#[test]
-fn any_bytes_are_refused_or_messages_that_arrive_again() {
-    let mut generator = Xoshiro256PlusPlus::seed_from_u64(9);
+/// As many inputs as asked for.
+fn survives(inputs: usize, seed: u64) {
+    let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed);
     let (mut messages, mut delivered) = (0, 0);
-    for _ in 0..INPUTS {
+    for _ in 0..inputs {
         let mut bytes = Vec::new();
         for _ in 0..generator.random_range(1..5) {
             messages += 1;
@@ -25,4 +26,15 @@ fn any_bytes_are_refused_or_messages_that_arrive_again() {
     }
     // Not a test of refusals alone.
     assert!(delivered > messages / 20 && delivered < messages, "{delivered} of {messages} delivered");
+}
+
+#[test]
+fn any_bytes_are_refused_or_messages_that_arrive_again() {
+    survives(INPUTS, 9);
+}
+
+#[test]
+#[ignore = "long"]
+fn long_forty_times_as_many_bytes_are_refused_or_messages_that_arrive_again() {
+    survives(40 * INPUTS, 109);
 }

@@ -14,7 +14,6 @@
 //! - [`processor`]: control is never late, whatever the network takes; the processor's share; late inferences;
 //! - [`pil`]: the flashed binary flies the plant, bit for bit, through good lines and bad ones;
 //! - [`structure`]: no circle between files, no use against the layers that each crate states;
-//! - [`unsafe_code`]: there is none but those kernels, each block with its reason;
 //! - [`upload`]: a model goes over the link into the flash, and flies from the next start on.
 //!
 //! The parts have tests of their own: plant against an independent simulator and every generator and parser in `host-sim`, model
@@ -34,5 +33,4 @@ mod mcu;
 mod pil;
 mod processor;
 mod structure;
-mod unsafe_code;
 mod upload;

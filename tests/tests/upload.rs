@@ -1,4 +1,5 @@
-//! A model that is uploaded to the emulated board flies after its restart with every bit of the software, whatever happened on the way.
+//! A model that is uploaded to the emulated board flies after its restart with every bit of the software, whatever happened on
+//! the way.
 
 use impromptu_firmware::{
     adapter::Lanes,

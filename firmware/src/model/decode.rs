@@ -59,7 +59,8 @@ mod tests {
     proptest! {
         #[test]
         fn damaged_and_whole_cards_are_what_postcard_says(which in 0usize..2, changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..3), keep in any::<prop::sample::Index>(), cut in any::<bool>()) {
-            let models: [&[u8]; 2] = [include_bytes!("../../../tests/golden/models/int8-lane.model"), include_bytes!("../../../tests/golden/models/float-skip.model")];
+            let models: [&[u8]; 2] =
+                [include_bytes!("../../tests/models/int8-lane.model"), include_bytes!("../../tests/models/float-skip.model")];
             let mut bytes = file::split(models[which]).unwrap().0.to_vec();
             for (index, byte) in changes {
                 let at = index.index(bytes.len());

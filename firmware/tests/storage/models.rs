@@ -9,8 +9,8 @@ use impromptu_firmware::{
 /// Samples of the desired trajectory that these loops keep.
 const PREVIEW: usize = 192;
 
-pub(crate) const FLOAT: &[u8] = include_bytes!("../../../tests/golden/models/float-skip.model");
-pub(crate) const INTEGER: &[u8] = include_bytes!("../../../tests/golden/models/int8-lane.model");
+pub(crate) const FLOAT: &[u8] = include_bytes!("../models/float-skip.model");
+pub(crate) const INTEGER: &[u8] = include_bytes!("../models/int8-lane.model");
 
 /// The file with a correct check sum.
 fn sealed(mut file: Vec<u8>) -> Vec<u8> {

@@ -76,7 +76,7 @@ pub fn model_file(
         features: set.features.clone(),
         outputs: vec![Output { channel: 0, limit: f32::MAX, slew: f32::MAX }],
         envelope: rows.envelope().iter().map(|(low, high)| (*low as f32, *high as f32)).collect(),
-        lane: None,
+        feedback_lane: None,
         monitor: None,
     };
     encode(&description, Some(&float_network(network)), precision, &rows.narrow())

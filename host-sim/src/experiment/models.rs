@@ -125,7 +125,7 @@ pub fn describe(
         features: recipe.features(),
         outputs: outputs(rows, lane),
         envelope: rows.envelope.clone(),
-        lane: lane.cloned(),
+        feedback_lane: lane.cloned(),
         monitor: None,
     }
 }

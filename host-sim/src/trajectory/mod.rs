@@ -137,14 +137,6 @@ impl Trajectory {
     pub fn peak_acceleration(&self) -> f64 {
         self.samples.iter().fold(0.0, |peak, s| norm(s.acceleration).max(peak))
     }
-
-    /// Root mean square of the acceleration over the drawn part, m/s².
-    #[must_use]
-    pub fn rms_acceleration(&self) -> f64 {
-        let drawn = &self.samples[self.scored.clone()];
-        let sum: f64 = drawn.iter().map(|s| norm(s.acceleration) * norm(s.acceleration)).sum();
-        (sum / drawn.len().max(1) as f64).sqrt()
-    }
 }
 
 /// Euclidean length of a vector.

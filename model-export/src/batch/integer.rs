@@ -3,12 +3,14 @@
 use impromptu_firmware::network::{requantise, tanh_code};
 use pulp::{Arch, Simd, WithSimd};
 
-use super::{BLOCK, padded_matrix::PaddedMatrix};
+use super::padded_matrix::PaddedMatrix;
 use crate::{
     float_network::Activation,
     stored_network::{Requantisation, StoredIntegerLayer},
 };
 
+/// Rows that are evaluated together: the activations of two layers of 128 units stay in the second-level cache.
+pub(super) const BLOCK: usize = 128;
 /// Rows of the batch in a tile.
 const LANES: usize = 32;
 /// Outputs in a tile.
@@ -91,8 +93,8 @@ fn activated(activation: Activation, code: i32, limit: u16) -> i16 {
     }
 }
 
-/// Accumulators of `OUTPUTS` outputs (what is beyond the last is zero) and `LANES` rows. Sums of integers that cannot overflow may be
-/// taken in any order.
+/// Accumulators of `OUTPUTS` outputs (what is beyond the last is zero) and `LANES` rows. Sums of integers that cannot overflow
+/// may be taken in any order.
 fn tile(
     arch: Arch,
     layer: &StoredIntegerLayer,

@@ -1,12 +1,12 @@
-//! Matrix products for training and batch evaluation, in safe Rust on vector registers (the `pulp` crate picks AVX-512, AVX2 or scalar code at
-//! run time).
+//! Matrix products for training and batch evaluation, in safe Rust on vector registers (the `pulp` crate picks AVX-512, AVX2 or
+//! scalar code at run time).
 //!
 //! A tile of 8 rows and 2 vectors of the result stays in registers while the products are summed up; operands are read in
 //! place (see [`PaddedMatrix`] for the stride that makes this fast), nothing is packed or transposed, and what comes before
 //! and after the sum (bias, activation, derivative) happens while the tile is in registers.
 //!
-//! Each element is one chain of multiply-adds in the order of the depth, fused unless the edge says otherwise ([`Unfused`]), so the
-//! result has the same bits whatever the width of the machine's registers.
+//! Each element is one chain of multiply-adds in the order of the depth, fused unless the edge says otherwise ([`Unfused`]), so
+//! the result has the same bits whatever the width of the machine's registers.
 
 use super::padded_matrix::PaddedMatrix;
 use pulp::{Arch, Simd, WithSimd};

@@ -1,8 +1,8 @@
 //! A network over many rows at once, on vector registers.
 //!
 //! *in* a [`FloatNetwork`] or a loaded model, and rows of features in physical units; *out* for each row exactly the bits that
-//! [`FloatNetwork::evaluate`] or the firmware's `Network::evaluate` give for it alone (rows must be finite; the sign of a zero may
-//! differ); *never* another order of summation; *source* the products of [`matrix_kernel`], without fusing.
+//! [`FloatNetwork::evaluate`] or the firmware's `Network::evaluate` give for it alone (rows must be finite; the sign of a zero
+//! may differ); *never* another order of summation; *source* the products of [`matrix_kernel`], without fusing.
 
 mod integer;
 pub mod matrix_kernel;
@@ -12,7 +12,7 @@ use impromptu_firmware::{model::Model, network};
 use pulp::Arch;
 
 use self::{
-    integer::IntegerLayers,
+    integer::{BLOCK, IntegerLayers},
     matrix_kernel::{Accumulate, Bias, Unfused, product},
     padded_matrix::PaddedMatrix,
 };
@@ -20,9 +20,6 @@ use crate::{
     float_network::{Activation, DenseLayer, FloatNetwork},
     stored_network::{StoredLayers, StoredNetwork},
 };
-
-/// Rows that are evaluated together: the activations of two layers of 128 units stay in the second-level cache.
-pub(crate) const BLOCK: usize = 128;
 
 /// Row-major `[outputs][inputs]` to a matrix with one row for each input.
 fn transposed(weights: &[f32], inputs: usize, outputs: usize) -> PaddedMatrix {
@@ -139,7 +136,8 @@ impl Batch {
         })
     }
 
-    /// Calls `each` with every row's index and outputs, in the outputs' units and in order; `rows` have one value for each feature.
+    /// Calls `each` with every row's index and outputs, in the outputs' units and in order; `rows` have one value for each
+    /// feature.
     pub fn evaluate<'r>(&mut self, rows: impl IntoIterator<Item = &'r [f32]>, mut each: impl FnMut(usize, &[f32])) {
         let mut first = 0;
         self.blocks(rows, |batch, rows| {
@@ -151,8 +149,8 @@ impl Batch {
         });
     }
 
-    /// Largest magnitude of the normalised inputs, then of each layer's outputs, over the rows: what calibration asks for. A model's
-    /// integer layers give none.
+    /// Largest magnitude of the normalised inputs, then of each layer's outputs, over the rows: what calibration asks for. A
+    /// model's integer layers give none.
     pub fn largest_magnitudes<'r>(&mut self, rows: impl IntoIterator<Item = &'r [f32]>) -> Vec<f32> {
         let layers = if let Layers::Float(layers) = &self.layers { layers.len() } else { 0 };
         let mut largest = vec![0.0f32; 1 + layers];

@@ -6,14 +6,15 @@
 //! e' = D (W_f e + (W_q - W_f) x_q + (b_q - b_f) + δ) + η
 //! ```
 //!
-//! where D holds values of the activation's derivative between both pre-activations (mean value theorem), δ the errors of both sums, η
-//! those behind both activations and what a saturation takes off. Unrolled, the difference of the outputs is the sum over the layers of
-//! (an interval Jacobian of the first network) × (what that layer adds), and both signs of the weights' differences cancel as far as
-//! the Jacobian is known. Where inputs are far from zero a Jacobian says little, but then what a layer gives hardly changes: so every layer's
-//! difference is bounded in turn, by its ranges too, and the unrolled sum may stop at any layer. What differs from Paulsen et al. 2020 (ReluDiff): derivatives instead of cases, so that tanh fits too.
+//! where D holds values of the activation's derivative between both pre-activations (mean value theorem), δ the errors of both
+//! sums, η those behind both activations and what a saturation takes off. Unrolled, the difference of the outputs is the sum over
+//! the layers of (an interval Jacobian of the first network) × (what that layer adds), and both signs of the weights' differences
+//! cancel as far as the Jacobian is known. Where inputs are far from zero a Jacobian says little, but then what a layer gives
+//! hardly changes: so every layer's difference is bounded in turn, by its ranges too, and the unrolled sum may stop at any layer.
+//! What differs from Paulsen et al. 2020 (ReluDiff): derivatives instead of cases, so that tanh fits too.
 
 use super::{
-    Interval, MARGIN,
+    interval::{Interval, MARGIN},
     layered::{Dense, Layered},
     propagation::{Known, product},
     relaxation::Function,
@@ -160,8 +161,8 @@ impl<'a> Pair<'a> {
         Self { first, second, input_rounding, steps }
     }
 
-    /// Largest difference of each pre-activation of `layer`, given those of the outputs of the layers before it: the least of the bounds
-    /// that stop at each of these, and of what the ranges alone say.
+    /// Largest difference of each pre-activation of `layer`, given those of the outputs of the layers before it: the least of the
+    /// bounds that stop at each of these, and of what the ranges alone say.
     fn sums(&self, layer: usize, before: &[Vec<f64>]) -> Vec<f64> {
         let ranges = self.first.1[layer].sums.iter().zip(&self.second.1[layer].sums);
         let mut least: Vec<f64> = ranges.map(|(f, q)| farthest(*f, *q)).collect();

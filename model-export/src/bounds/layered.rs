@@ -7,12 +7,12 @@
 //! x' = activation(z) within ±clip, + η,  |η| ≤ activation_error          y = mean + scale · (z of the last layer + skip · n)
 //! ```
 //!
-//! of which the stored arithmetic is one member for every choice of its roundings; *never* one that it is not; *source* the standard
-//! error analysis of sums (Higham, *Accuracy and Stability of Numerical Algorithms*, section 3.1).
+//! of which the stored arithmetic is one member for every choice of its roundings; *never* one that it is not; *source* the
+//! standard error analysis of sums (Higham, *Accuracy and Stability of Numerical Algorithms*, section 3.1).
 
 use impromptu_firmware::network::{TANH_ERROR, TANH_INPUT_ONE, tanh_code};
 
-use super::Interval;
+use super::interval::Interval;
 use crate::{
     float_network::{Activation, DenseLayer, FloatNetwork},
     stored_network::{Requantisation, StoredIntegerLayer, StoredLayers, StoredNetwork},
@@ -118,8 +118,8 @@ impl Layered {
         }
     }
 
-    /// A model file's network as the firmware evaluates it. Where a unit of its codes is arbitrary, it is chosen so that the weights
-    /// come near to those of `float`, from which the file was made.
+    /// A model file's network as the firmware evaluates it. Where a unit of its codes is arbitrary, it is chosen so that the
+    /// weights come near to those of `float`, from which the file was made.
     pub(super) fn of_model(stored: &StoredNetwork, float: &FloatNetwork, envelope: &[(f32, f32)]) -> Self {
         let inputs = normalised(envelope, |index, value| (value - stored.input_mean[index]) * stored.input_reciprocal[index]);
         let mut input_error = vec![0.0; inputs.len()];

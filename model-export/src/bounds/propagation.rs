@@ -1,12 +1,12 @@
 //! Ranges of every pre-activation and output, by back-substitution of straight lines.
 //!
-//! Zhang et al. 2018, *Efficient Neural Network Robustness Certification with General Activation Functions* (CROWN): a bound on a sum of
-//! activations is a sum of lines in the pre-activations, these are sums of the activations before, and so on to the inputs, where the
-//! coefficients meet those of the skip; only then is the box put in. Each pre-activation is also bounded by interval arithmetic, and the
-//! tighter end counts.
+//! Zhang et al. 2018, *Efficient Neural Network Robustness Certification with General Activation Functions* (CROWN): a bound on a
+//! sum of activations is a sum of lines in the pre-activations, these are sums of the activations before, and so on to the
+//! inputs, where the coefficients meet those of the skip; only then is the box put in. Each pre-activation is also bounded by
+//! interval arithmetic, and the tighter end counts.
 
 use super::{
-    Interval, MARGIN,
+    interval::{Interval, MARGIN},
     layered::{Dense, Layered},
     relaxation::{Function, Line},
 };
@@ -94,8 +94,8 @@ impl Layered {
         known
     }
 
-    /// Lower bounds of sums of the inputs of layer `layer` (the outputs of `known[layer - 1]`), one for each row of coefficients, plus
-    /// those of the normalised inputs that `skip` has for each row.
+    /// Lower bounds of sums of the inputs of layer `layer` (the outputs of `known[layer - 1]`), one for each row of coefficients,
+    /// plus those of the normalised inputs that `skip` has for each row.
     fn lowest(&self, known: &[Known], layer: usize, mut rows: Vec<Vec<f64>>, skip: Option<&[Vec<f64>]>) -> Vec<f64> {
         let mut constants = vec![0.0; rows.len()];
         for (dense, known) in self.layers.iter().zip(known).take(layer).rev() {

@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 use impromptu_firmware::model::{Model, file};
 use serde::Serialize;
 
-use super::{Format, beside};
+use super::{files::beside, format::Format};
 use crate::{
     Description, FloatNetwork, Precision, encode,
     replacement::replace,
@@ -27,8 +27,8 @@ pub(super) struct Export {
     /// Description; NET.json beside the network if not given.
     #[arg(long, value_name = "NET.json")]
     description: Option<PathBuf>,
-    /// Rows of features to calibrate int8 or int16 on and to take probes from, a column for each feature in the description's order and units,
-    /// below a header; NET.rows.csv beside the network if not given and there.
+    /// Rows of features to calibrate int8 or int16 on and to take probes from, a column for each feature in the description's
+    /// order and units, below a header; NET.rows.csv beside the network if not given and there.
     #[arg(long, value_name = "ROWS.csv", requires = "network")]
     calibration: Option<PathBuf>,
     /// Number format of the dense layers.

@@ -7,7 +7,10 @@ use clap::Args;
 use impromptu_firmware::model::Model;
 use serde::Serialize;
 
-use super::{Format, beside, read};
+use super::{
+    files::{beside, read},
+    format::Format,
+};
 use crate::{
     FloatNetwork, rows,
     verify::{Comparison, compare},
@@ -47,7 +50,7 @@ struct Verified {
     /// Probes of the network lane that gave their bits.
     network_probes: u8,
     /// Axes of the feedback lane whose probe gave its bits.
-    lane_probes: usize,
+    feedback_lane_probes: usize,
     comparison: Option<Comparison>,
     /// Every limit that is exceeded.
     failures: Vec<String>,
@@ -71,7 +74,7 @@ impl Verify {
         let verified = Verified {
             crc: format!("{:08x}", model.checksum()),
             network_probes: if model.network().is_some() { model.card().probes.count } else { 0 },
-            lane_probes: model.lane().map_or(0, |lane| lane.axes().len()),
+            feedback_lane_probes: model.lane().map_or(0, |lane| lane.axes().len()),
             comparison,
             failures,
             file: self.file,
@@ -104,7 +107,7 @@ impl Verified {
         let mut text = format!("{}: loads, CRC {}\n", self.file.display(), self.crc);
         text += &format!(
             "same bits on this machine: {} network probes, {} feedback lane axes\n",
-            self.network_probes, self.lane_probes
+            self.network_probes, self.feedback_lane_probes
         );
         if let Some(comparison) = &self.comparison {
             text += &format!("against the float network over {} rows:\n{comparison}\n", comparison.rows);

@@ -13,7 +13,10 @@
 //! The metadata map holds `format` = [`FORMAT_NAME`], `version` = [`FORMAT_VERSION`], `layers` (how many),
 //! `layer.0.activation`, … (`relu`, `tanh` or `linear`) and the notes. The same network gives the same bytes.
 
-use super::{Activation, DenseLayer, FloatNetwork, FloatNetworkError, layer_bias_name, layer_weight_name};
+use super::{
+    Activation, DenseLayer, FloatNetwork, FloatNetworkError,
+    names::{is_reserved, layer_bias_name, layer_weight_name},
+};
 use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io::Write;
@@ -75,11 +78,6 @@ pub enum FloatNetworkFileError {
     /// The parts were read and do not fit together.
     #[error(transparent)]
     Network(#[from] FloatNetworkError),
-}
-
-/// Metadata names which notes may not use.
-pub(super) fn is_reserved(key: &str) -> bool {
-    matches!(key, "format" | "version" | "layers") || key.starts_with("layer.")
 }
 
 impl FloatNetwork {

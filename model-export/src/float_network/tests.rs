@@ -128,7 +128,11 @@ proptest! {
     }
 
     #[test]
-    fn damaged_files_never_panic(network in networks(), cut in any::<prop::sample::Index>(), flip in any::<prop::sample::Index>()) {
+    fn damaged_files_never_panic(
+        network in networks(),
+        cut in any::<prop::sample::Index>(),
+        flip in any::<prop::sample::Index>(),
+    ) {
         let bytes = network.to_bytes().unwrap();
         prop_assert!(FloatNetwork::from_bytes(&bytes[..cut.index(bytes.len())]).is_err());
         let mut flipped = bytes.clone();

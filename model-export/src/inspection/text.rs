@@ -47,7 +47,7 @@ impl fmt::Display for Inspection {
             Some(network) => line(f, "network lane", network)?,
             None => line(f, "network lane", "none")?,
         }
-        match &self.lane {
+        match &self.feedback_lane {
             Some(lane) => line(f, "feedback lane", lane)?,
             None => line(f, "feedback lane", "none")?,
         }
@@ -61,14 +61,14 @@ impl fmt::Display for Inspection {
             format_args!(
                 "{} of the network lane, {} of the feedback lane: same bits on this machine",
                 if self.network.is_some() { self.network_probes } else { 0 },
-                self.lane.as_ref().map_or(0, |lane| lane.axes.len())
+                self.feedback_lane.as_ref().map_or(0, |lane| lane.axes.len())
             ),
         )?;
         writeln!(f, "\nOutputs\n{}", self.outputs_table())?;
         if self.network.is_some() {
             writeln!(f, "Network lane with features within their ranges in training: proven bounds\n{}", self.bounds_table())?;
         }
-        if let Some(lane) = &self.lane {
+        if let Some(lane) = &self.feedback_lane {
             writeln!(f, "Feedback lane\n{}", axes_table(lane))?;
         }
         if let Some(monitor) = &self.monitor {
@@ -131,8 +131,8 @@ impl fmt::Display for InspectedNetwork {
 
 impl fmt::Display for InspectedMonitor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { axes, period_s, memory_s, promise, unit } = self;
-        write!(f, "{} axes, every {period_s} s, response of {memory_s} s, promised error {promise} {unit}", axes.len())
+        let Self { axes, period_s, memory_s, validated_rms, unit } = self;
+        write!(f, "{} axes, every {period_s} s, response of {memory_s} s, validated RMS {validated_rms} {unit}", axes.len())
     }
 }
 

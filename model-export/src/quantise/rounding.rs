@@ -1,14 +1,16 @@
 //! Rounds a layer's weights so that its outputs change least.
 //!
-//! *in* the wanted weights in effective units and the second moments of the inputs; *out* weights that the kernel's packing can hold;
-//! *never* a weight that is further from what is wanted of it than half a step, but at the ends of the range; *source* Frantar et al. 2023
-//! (GPTQ): column after column is rounded, and the columns to come take over what the rounding did to the outputs, by the inverse of
-//! the inputs' moments. The packing in [`impromptu_firmware::network::kernel`] fixes the order within a pair of columns and rows.
+//! *in* the wanted weights in effective units and the second moments of the inputs; *out* weights that the kernel's packing can
+//! hold; *never* a weight that is further from what is wanted of it than half a step, but at the ends of the range; *source*
+//! Frantar et al. 2023 (GPTQ): column after column is rounded, and the columns to come take over what the rounding did to the
+//! outputs, by the inverse of the inputs' moments. The packing in [`impromptu_firmware::network::kernel`] fixes the order within
+//! a pair of columns and rows.
 
 use impromptu_firmware::network::{INPUT_PADDING, ROWS, kernel::Width};
 use nalgebra::{Cholesky, DMatrix, Dyn};
 
-/// Added to the diagonal of the moments, over its mean; without it the few directions that the rows leave out would take all the error.
+/// Added to the diagonal of the moments, over its mean; without it the few directions that the rows leave out would take all the
+/// error.
 const DAMPING: f64 = 0.01;
 
 /// Effective weights, row-major `[rows padded to whole blocks][inputs padded]`, for `wanted[row][input]` with `count` inputs.

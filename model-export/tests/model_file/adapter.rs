@@ -71,7 +71,7 @@ fn violent(seed: u64, interpolation: Interpolation) -> (Description, Vec<u8>) {
     let mut lane = lane([numbers.take(6, 3.0), numbers.take(6, 3.0)], numbers.take(6, 0.15), 2.0 * numbers.next());
     lane.axes[0].fast_limit = 0.4;
     lane.axes[0].integral_limit = 0.4;
-    description.lane = Some(lane);
+    description.feedback_lane = Some(lane);
     let bytes = encode(&description, Some(&float), Precision::Int8, &rows).unwrap();
     (description, bytes)
 }
@@ -81,7 +81,11 @@ proptest! {
 
     /// Off is the desired reference to the bit: never switched on, and some time after having been on.
     #[test]
-    fn bypass_is_bit_identical(seed in any::<u64>(), patterns in proptest::collection::vec(any::<[u32; 2]>(), 8), was_on in any::<bool>()) {
+    fn bypass_is_bit_identical(
+        seed in any::<u64>(),
+        patterns in proptest::collection::vec(any::<[u32; 2]>(), 8),
+        was_on in any::<bool>(),
+    ) {
         let (description, bytes) = violent(seed, Interpolation::Linear);
         let pattern = |tick: i32| patterns[tick.rem_euclid(8) as usize].map(f32::from_bits);
         // Any bits at all while off, negative zero and NaN among them; numbers while on.
@@ -102,7 +106,10 @@ proptest! {
         seed in any::<u64>(),
         linear in any::<bool>(),
         raw in proptest::collection::vec(any::<[u32; 2]>(), 16),
-        huge in proptest::collection::vec(prop::sample::select(vec![1e30f32, -1e30, f32::MAX, f32::MIN, f32::NAN, f32::INFINITY, 0.0]), 16),
+        huge in proptest::collection::vec(
+            prop::sample::select(vec![1e30f32, -1e30, f32::MAX, f32::MIN, f32::NAN, f32::INFINITY, 0.0]),
+            16,
+        ),
         switches in any::<u64>(),
     ) {
         let (description, bytes) = violent(seed, if linear { Interpolation::Linear } else { Interpolation::Hold });
@@ -130,8 +137,8 @@ proptest! {
     #[test]
     fn corrections_do_not_depend_on_the_place(seed in any::<u64>(), shift in -100f32..100.0) {
         let (mut description, _) = violent(seed, Interpolation::Linear);
-        description.lane.as_mut().unwrap().axes[0].error_coefficients = vec![vec![-0.5, 0.2], vec![-0.1, 0.0]];
-        description.lane.as_mut().unwrap().axes[0].output_coefficients = vec![0.3, 0.1];
+        description.feedback_lane.as_mut().unwrap().axes[0].error_coefficients = vec![vec![-0.5, 0.2], vec![-0.1, 0.0]];
+        description.feedback_lane.as_mut().unwrap().axes[0].output_coefficients = vec![0.3, 0.1];
         let mut numbers = Numbers(seed);
         let float = network(&mut numbers, 4, &[(9, Activation::Tanh)], 2, true);
         let bytes = encode(&description, Some(&float), Precision::Float, &rows(&mut numbers, &float, 10)).unwrap();
@@ -155,7 +162,7 @@ fn engaging_and_disengaging_are_bumpless() {
         description.outputs[0].slew = slew;
         let mut lane = lane([vec![0.0], vec![0.0]], vec![0.0], -5.0);
         lane.axes[0].integral_limit = 0.2;
-        description.lane = Some(lane);
+        description.feedback_lane = Some(lane);
         let bytes = constant_model(description.clone(), [-0.2, 0.0]);
         let on = |tick: i32| if (phase..300 + phase).contains(&tick) { Lanes::BOTH } else { Lanes::NONE };
         let flight = fly(&bytes, &description, 600, |_| [1.0, 0.0], |_| [1.5, 0.0], on);
@@ -205,7 +212,7 @@ fn ramps_pass_through_the_held_values() {
 #[test]
 fn each_lane_acts_alone() {
     let mut description = description(1);
-    description.lane = Some(lane([vec![-0.5], vec![0.0]], vec![0.0], 0.0));
+    description.feedback_lane = Some(lane([vec![-0.5], vec![0.0]], vec![0.0], 0.0));
     let bytes = constant_model(description.clone(), [0.25, 0.5]);
     let settled = |lanes| fly(&bytes, &description, 60, |_| [1.0, 0.0], |_| [1.0625, 0.0], |_| lanes)[59].2;
     assert_eq!(settled(Lanes { network: true, feedback: false }), [0.25, 0.5]);

@@ -20,7 +20,7 @@ impl Folder {
         let float = network(&mut numbers, 3, &[(9, Activation::Tanh)], 2, true);
         float.write(&folder.path("net.safetensors")).unwrap();
         let mut description = description(3);
-        description.lane = Some(lane([vec![-1.0], vec![-0.4]], vec![0.0], -0.5));
+        description.feedback_lane = Some(lane([vec![-1.0], vec![-0.4]], vec![0.0], -0.5));
         std::fs::write(folder.path("net.json"), description.to_json()).unwrap();
         let mut text = "a,b,c\n".to_owned();
         for row in rows(&mut numbers, &float, 64) {
@@ -66,7 +66,7 @@ fn exports_from_a_name_alone_and_the_result_loads() {
 fn a_lane_alone_needs_no_network() {
     let folder = Folder::new();
     let mut lane_only = description(0);
-    lane_only.lane = Some(lane([vec![-1.0], vec![-0.4]], vec![0.0], -0.5));
+    lane_only.feedback_lane = Some(lane([vec![-1.0], vec![-0.4]], vec![0.0], -0.5));
     std::fs::write(folder.path("lane.json"), lane_only.to_json()).unwrap();
     assert_eq!(folder.run("export --description lane.json --output lane.model").0, FINE);
     let (code, out, _) = folder.run("inspect lane.model");
@@ -103,7 +103,7 @@ fn inspects_for_people_and_programs() {
     assert_eq!(json["network"]["layers"][0][1], "Tanh");
     assert_eq!(json["timing"]["preview_ticks"], 30);
     assert_eq!(json["features"].as_array().unwrap().len(), 3);
-    assert_eq!(json["lane"]["axes"][0]["errors"][1], "measured velocity - desired velocity");
+    assert_eq!(json["feedback_lane"]["axes"][0]["errors"][1], "measured velocity - desired velocity");
     assert_eq!(json["size"]["file"].as_u64().unwrap(), std::fs::metadata(folder.path("net.model")).unwrap().len());
 }
 

@@ -108,7 +108,10 @@ proptest! {
     }
 
     #[test]
-    fn arbitrary_cards_never_panic(card in proptest::collection::vec(any::<u8>(), 0..300), blob in proptest::collection::vec(any::<u8>(), 0..64)) {
+    fn arbitrary_cards_never_panic(
+        card in proptest::collection::vec(any::<u8>(), 0..300),
+        blob in proptest::collection::vec(any::<u8>(), 0..64),
+    ) {
         load(&assembled(&card, &blob));
     }
 

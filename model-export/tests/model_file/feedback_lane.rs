@@ -23,7 +23,7 @@ fn lane_only(lane: LaneDescription, delay_s: f32) -> (Description, Vec<u8>) {
     let mut description = description(0);
     description.timing.measurement_delay_s = delay_s;
     description.outputs = vec![Output { channel: 0, limit: 10.0, slew: 10.0 }];
-    description.lane = Some(lane);
+    description.feedback_lane = Some(lane);
     let bytes = encode(&description, None, Precision::Float, &[]).unwrap();
     (description, bytes)
 }
@@ -98,7 +98,8 @@ proptest! {
     }
 }
 
-/// Where much is desired, or where the loop has strayed, the fast clamp shrinks by 1 / (1 + v²); it comes back as the peak decays.
+/// Where much is desired, or where the loop has strayed, the fast clamp shrinks by 1 / (1 + v²); it comes back as the peak
+/// decays.
 #[test]
 fn authority_falls_with_what_is_desired_and_with_the_error() {
     let cautious = |error_scale| {
@@ -175,7 +176,7 @@ fn limited_outputs_enter_the_lags_as_applied() {
     description.outputs = vec![Output { channel: 0, limit: 0.02, slew: 1.0 }];
     let mut memory = lane([vec![-1.0], vec![0.0]], vec![-0.5], 0.0);
     memory.axes[0].fast_limit = 1.0;
-    description.lane = Some(memory);
+    description.feedback_lane = Some(memory);
     let bytes = encode(&description, None, Precision::Float, &[]).unwrap();
     let model = Model::from_bytes(&bytes).unwrap();
     let mut adapter: Adapter<'_, 2, 2, 2> = Adapter::new(&model, &table(&description), 100.0, CAPACITY).unwrap();

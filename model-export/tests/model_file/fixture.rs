@@ -37,7 +37,8 @@ fn channel(name: &str, unit: &str, end: EndRule) -> ChannelDescription {
     ChannelDescription { name: name.into(), unit: unit.into(), frame: "world ENU".into(), end }
 }
 
-/// Position and velocity along one axis, desired, measured and as a reference; one window of desired positions; both references corrected.
+/// Position and velocity along one axis, desired, measured and as a reference; one window of desired positions; both references
+/// corrected.
 pub(crate) fn description(window: usize) -> Description {
     let signal = vec![channel("position", "m", EndRule::Hold), channel("velocity", "m/s", EndRule::Zero)];
     let feature = |offset: usize| Feature {
@@ -60,7 +61,7 @@ pub(crate) fn description(window: usize) -> Description {
         features: (0..window).map(feature).collect(),
         outputs: vec![Output { channel: 0, limit: 0.5, slew: 0.1 }, Output { channel: 1, limit: 2.0, slew: 0.5 }],
         envelope: vec![(-3.0, 3.0); window],
-        lane: None,
+        feedback_lane: None,
         monitor: None,
     }
 }
@@ -134,9 +135,9 @@ pub(crate) fn small_model(precision: Precision) -> Vec<u8> {
     let network = network(&mut numbers, 3, &[(5, Activation::Tanh)], 2, true);
     let rows = rows(&mut numbers, &network, 32);
     let mut description = description(3);
-    description.lane = Some(lane([vec![-0.5, 0.1], vec![-0.2, 0.0]], vec![0.3, 0.1], -0.2));
+    description.feedback_lane = Some(lane([vec![-0.5, 0.1], vec![-0.2, 0.0]], vec![0.3, 0.1], -0.2));
     let axis = MonitorAxisDescription { error: (0, 0), inputs: vec![0, 1], taps: vec![vec![0.1, 0.5, 0.3], vec![0.0, 0.2, 0.1]] };
-    description.monitor = Some(MonitorDescription { divisor: 5, promise: 0.01, axes: vec![axis] });
+    description.monitor = Some(MonitorDescription { divisor: 5, validated_rms: 0.01, axes: vec![axis] });
     encode(&description, Some(&network), precision, &rows).unwrap()
 }
 

@@ -42,7 +42,7 @@ fn description() -> Description {
         ],
         outputs: vec![Output { channel: 0, limit: 100.0, slew: 100.0 }],
         envelope: vec![(-10.0, 10.0); 3],
-        lane: None,
+        feedback_lane: None,
         monitor: None,
     }
 }

@@ -1,5 +1,6 @@
-//! The exact bytes of small models: a change of the format, or of what writes it, is seen here. They are also what fuzzing of the decoder
-//! starts from. `UPDATE_GOLDEN=1` rewrites them; format version 1 is frozen, so that it must not be needed for a file that exists.
+//! The exact bytes of small models: a change of the format, or of what writes it, is seen here. They are also what fuzzing of the
+//! decoder starts from. `UPDATE_GOLDEN=1` rewrites them; format version 1 is frozen, so that it must not be needed for a file
+//! that exists.
 
 use std::{env, fs, path::Path};
 

@@ -30,9 +30,9 @@ struct Tick {
 fn guarded() -> Description {
     let mut description = description(1);
     description.timing.fade_s = 0.2;
-    description.lane = Some(lane([vec![-0.5], vec![0.0]], vec![0.0], 0.0));
+    description.feedback_lane = Some(lane([vec![-0.5], vec![0.0]], vec![0.0], 0.0));
     let axis = MonitorAxisDescription { error: (0, 0), inputs: vec![0], taps: vec![vec![1.0]] };
-    description.monitor = Some(MonitorDescription { divisor: 10, promise: 0.01, axes: vec![axis] });
+    description.monitor = Some(MonitorDescription { divisor: 10, validated_rms: 0.01, axes: vec![axis] });
     description
 }
 
@@ -126,7 +126,7 @@ fn each_lane_trips_alone() {
     let swing = |tick: i32| Doing { measured: [1.0 - if (tick / 20) % 2 == 0 { 0.1 } else { -0.1 }, 0.0], ..calm(Lanes::BOTH) };
     let mut description = guarded();
     // Of the opposite sign: the measured swing is what the lane makes.
-    description.lane = Some(lane([vec![0.5], vec![0.0]], vec![0.0], 0.0));
+    description.feedback_lane = Some(lane([vec![0.5], vec![0.0]], vec![0.0], 0.0));
     description.monitor.as_mut().unwrap().axes[0].taps = vec![vec![2.0]];
     let flight = fly(description, [0.0, 0.0], GuardSettings::default(), 200, swing);
     assert_eq!(flight[199].trips, only(Trip::Evidence, [0, 1]));
@@ -151,7 +151,7 @@ fn old_measurements_and_lasting_limits_trip() {
     // A network that asks for twice the limit.
     let mut description = guarded();
     description.monitor = None;
-    description.lane = None;
+    description.feedback_lane = None;
     description.features.truncate(1);
     let mut tight = description.clone();
     tight.outputs[0].slew = 1e-4;
@@ -170,7 +170,7 @@ fn old_measurements_and_lasting_limits_trip() {
 fn what_the_evidence_speaks_against_again_and_again_stays_off_until_it_is_armed() {
     // The loop swings whenever the lane acts, and is calm half a second later.
     let mut description = guarded();
-    description.lane = Some(lane([vec![0.5], vec![0.0]], vec![0.0], 0.0));
+    description.feedback_lane = Some(lane([vec![0.5], vec![0.0]], vec![0.0], 0.0));
     description.monitor.as_mut().unwrap().axes[0].taps = vec![vec![2.0]];
     let lanes = |tick: i32| if (2500..2510).contains(&tick) { Lanes::NONE } else { Lanes { network: false, feedback: true } };
     let doing = |tick: i32| Doing { measured: [1.0 - if (tick / 20) % 2 == 0 { 0.1 } else { -0.1 }, 0.0], ..calm(lanes(tick)) };
@@ -236,8 +236,8 @@ fn inferences_that_come_too_late_trip_the_network_alone_until_they_are_in_time()
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(60))]
 
-    /// Any bits as measurements and ages: finite corrections, at most one trip of a lane in a hold time, and the baseline's bits where no
-    /// lane may act and the fade is over.
+    /// Any bits as measurements and ages: finite corrections, at most one trip of a lane in a hold time, and the baseline's bits
+    /// where no lane may act and the fade is over.
     #[test]
     fn whatever_comes_in_a_lane_trips_at_most_once_in_a_hold_time(
         raw in proptest::collection::vec(any::<[u32; 2]>(), 16),
@@ -249,14 +249,16 @@ proptest! {
     ) {
         let doing = |tick: i32| {
             let at = (tick / period).rem_euclid(16) as usize;
-            let measured = if (bad >> at) & 1 == 1 && tick % 5 == 0 { raw[at].map(f32::from_bits) } else { [1.0 + small[at], small[15 - at]] };
+            let damaged = (bad >> at) & 1 == 1 && tick % 5 == 0;
+            let measured = if damaged { raw[at].map(f32::from_bits) } else { [1.0 + small[at], small[15 - at]] };
             Doing { measured, age: ages[at % 8], ..calm(Lanes::BOTH) }
         };
         let settings = GuardSettings { hold_s: 0.5, ..GuardSettings::default() };
         let flight = fly(guarded(), [correction, 0.1], settings, 900, doing);
         prop_assert!(flight.iter().all(|tick| tick.correction.iter().all(|value| value.is_finite())));
         for lane in 0..2 {
-            let times: Vec<usize> = (1..flight.len()).filter(|&at| flight[at].trips.by_lane()[lane] > flight[at - 1].trips.by_lane()[lane]).collect();
+            let trips = |at: usize| flight[at].trips.by_lane()[lane];
+            let times: Vec<usize> = (1..flight.len()).filter(|&at| trips(at) > trips(at - 1)).collect();
             prop_assert!(times.windows(2).all(|pair| pair[1] - pair[0] >= 50), "{times:?}");
         }
         // 15 ticks of handing over and the slew's longest way.

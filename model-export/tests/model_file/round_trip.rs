@@ -56,8 +56,9 @@ proptest! {
         }
     }
 
-    /// int8 weights are off by at most 1/254 of the row's largest: about 0.4 % of a row's sum. Stated: 1 % of the output's RMS for one
-    /// layer and half a percent more for each further one (measured over such networks: 0.4 % in the mean, 1.0 % at worst).
+    /// int8 weights are off by at most 1/254 of the row's largest: about 0.4 % of a row's sum. Stated: 1 % of the output's RMS
+    /// for one layer and half a percent more for each further one (measured over such networks: 0.4 % in the mean, 1.0 % at
+    /// worst).
     #[test]
     fn int8_is_close(seed in any::<u64>(), inputs in 4usize..80, hidden in hidden(), skip in any::<bool>()) {
         let mut numbers = Numbers(seed);
@@ -100,7 +101,7 @@ proptest! {
 #[test]
 fn either_lane_works_alone() {
     let mut lane_only = description(0);
-    lane_only.lane = Some(lane([vec![-1.0], vec![-0.4]], vec![0.0], -0.5));
+    lane_only.feedback_lane = Some(lane([vec![-1.0], vec![-0.4]], vec![0.0], -0.5));
     let bytes = encode(&lane_only, None, Precision::Int8, &[]).unwrap();
     let model = Model::from_bytes(&bytes).unwrap();
     assert!(model.network().is_none() && model.lane().is_some());
@@ -152,7 +153,7 @@ fn what_does_not_fit_is_named() {
     let float = network(&mut Numbers(1), 3, &[(4, Activation::Relu)], 2, true);
     let refusal = |change: &dyn Fn(&mut impromptu_model_export::Description, &mut FloatNetwork), rows: &[Vec<f32>]| {
         let (mut description, mut float) = (description(3), float.clone());
-        description.lane = Some(lane([vec![-1.0], vec![-0.4]], vec![0.0], 0.0));
+        description.feedback_lane = Some(lane([vec![-1.0], vec![-0.4]], vec![0.0], 0.0));
         change(&mut description, &mut float);
         encode(&description, Some(&float), Precision::Int8, rows).unwrap_err().to_string()
     };
@@ -169,10 +170,10 @@ fn what_does_not_fit_is_named() {
     same(refusal(&|_, _| (), &[vec![0.0; 3], vec![0.0, f32::NAN, 0.0]]), "calibration row 2: value 2");
     same(refusal(&|d, _| d.timing.fade_s = -1.0, &good), "`timing.fade_s` is -1 s");
     same(refusal(&|d, _| d.timing.fade_s = 1e9, &good), "`timing.fade_s`");
-    same(refusal(&|d, _| d.lane.as_mut().unwrap().axes[0].errors.truncate(1), &good), "lists of error coefficients");
-    same(refusal(&|d, _| d.lane.as_mut().unwrap().axes[0].error_coefficients[1].push(0.0), &good), "lags of the feedback lane");
+    same(refusal(&|d, _| d.feedback_lane.as_mut().unwrap().axes[0].errors.truncate(1), &good), "lists of error coefficients");
+    same(refusal(&|d, _| d.feedback_lane.as_mut().unwrap().axes[0].error_coefficients[1].push(0.0), &good), "lags of the feedback lane");
     same(
-        refusal(&|d, _| d.lane.as_mut().unwrap().axes[0].output_coefficients = vec![0.0; 257], &good),
+        refusal(&|d, _| d.feedback_lane.as_mut().unwrap().axes[0].output_coefficients = vec![0.0; 257], &good),
         "257, the firmware holds at most 32",
     );
     same(refusal(&|_, f| f.layers[0].weights[2] = f32::NAN, &good), "`layer.0.weight` is not finite at index 2");

@@ -11,7 +11,7 @@ pub struct Kernel {
     pub name: &'static str,
     /// What it reads.
     pub form: Form,
-    /// Its number on the board (`tests/mcu/src/request.rs`).
+    /// Its number on the board (`tests/peers/mcu-benchmark/src/request.rs`).
     pub number: u32,
 }
 

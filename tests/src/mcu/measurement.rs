@@ -16,11 +16,11 @@ use super::{
     memory::Symbols,
     nets::Net,
 };
-use crate::emulator::{FIRMWARE, build_firmware, run, run_with, target_folder};
+use crate::emulator::{FIRMWARE, build_firmware_of, run, run_with, target_folder, workspace};
 
 /// Far more than the slowest run needs.
 const TIMEOUT: Duration = Duration::from_secs(120);
-/// Most bytes of weights in RAM: the core-coupled memory of the real chip (`tests/mcu/src/request.rs`).
+/// Most bytes of weights in RAM: the core-coupled memory of the real chip (`tests/peers/mcu-benchmark/src/request.rs`).
 const RAM_FOR_WEIGHTS: usize = 64 * 1024;
 /// Bytes of an answer in front of the outputs.
 const ANSWER_HEADER: usize = 12;
@@ -140,7 +140,8 @@ impl<'p> Board<'p> {
         remove_others(&folder, images.keys().map(String::as_str).collect())?;
         let folder = folder.canonicalize()?;
         let folder = folder.to_str().context("the target folder's name is not Unicode")?;
-        let elf = build_firmware("impromptu-mcu-benchmark", "mcu-benchmark", FIRMWARE, &[("IMPROMPTU_MCU_IMAGES", folder)])?;
+        let (package, environment) = ("impromptu-mcu-benchmark", [("IMPROMPTU_MCU_IMAGES", folder)]);
+        let elf = build_firmware_of(&workspace().join("tests/peers"), package, "mcu-benchmark", FIRMWARE, &environment)?;
         Ok(Self { symbols: Symbols::read(&elf)?, elf, plugin, images })
     }
 

@@ -161,7 +161,7 @@ fn describe(name: &str, features: Vec<Feature>, outputs: usize) -> Description {
         envelope: vec![(-ENVELOPE, ENVELOPE); features.len()],
         features,
         outputs: (0..outputs as u8).map(|channel| Output { channel, limit: 10.0, slew: 1.0 }).collect(),
-        lane: None,
+        feedback_lane: None,
         monitor: None,
     }
 }

@@ -62,14 +62,14 @@ pub(crate) fn file_at(divisor: u16, shape: &Shape, precision: Precision) -> Vec<
         envelope: vec![(-2.0 * FEATURE_SCALE, 2.0 * FEATURE_SCALE); features.len()],
         features,
         outputs: (0..6).map(output).collect(),
-        lane: Some(LaneDescription {
+        feedback_lane: Some(LaneDescription {
             axes: (0..3).map(|axis| lane_axis(axis, &mut random)).collect(),
             authority: Default::default(),
             margins: Margins::default(),
         }),
         monitor: Some(MonitorDescription {
             divisor: 5,
-            promise: 0.01,
+            validated_rms: 0.01,
             axes: (0..3).map(|axis| monitored(axis, &mut random)).collect(),
         }),
     };

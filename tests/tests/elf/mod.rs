@@ -80,7 +80,7 @@ fn the_golden_memory_holds() {
         golden::UPDATE_VARIABLE,
         footprint.table(12)
     );
-    golden::compare_for_compiler(GOLDEN, &compiler, &text).unwrap();
+    golden::compare(GOLDEN, &text).unwrap();
 }
 
 #[test]

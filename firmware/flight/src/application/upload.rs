@@ -162,7 +162,7 @@ mod tests {
     };
     use proptest::prelude::*;
 
-    const MODEL: &[u8] = include_bytes!("../../../../tests/golden/models/int8-lane.model");
+    const MODEL: &[u8] = include_bytes!("../../tests/models/int8-lane.model");
 
     /// The command's outcome, by way of both mailboxes.
     fn obey<S: Slot>(uploader: &mut Uploader<S>, command: Command<'_>) -> Outcome {

@@ -64,7 +64,7 @@ pub fn sweep(
         // An effort at which there is no lane is a gap in the figure.
         let Some(lane) = lanes(&one(effort), &logs).ok().and_then(|lanes| lanes.into_iter().next()) else { return Ok(None) };
         let margins = lane.margins;
-        let description = Description { lane: Some(lane), monitor: None, ..built.models.description.clone() };
+        let description = Description { feedback_lane: Some(lane), monitor: None, ..built.models.description.clone() };
         let bytes = encode(&description, Some(&built.learned.quantised), Precision::Int8, &built.learned.rows.calibration)?;
         let model = Model::from_bytes(&bytes).map_err(ExportError::Refused)?;
         let mut reductions = [(0.0, 0.0); DELAYS.len()];
