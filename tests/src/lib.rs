@@ -9,4 +9,4 @@ pub mod golden;
 pub mod link;
 pub mod mcu;
 
-pub use impromptu_host_sim::emulator;
+pub use impromptu_pil::emulator;

@@ -9,15 +9,16 @@ use impromptu_firmware::{
     guard::{GuardSettings, Trip},
     model::Model,
 };
-use impromptu_host_sim::{
+use impromptu_model_export::{Description, FloatNetwork, Precision, description::LaneDescription, encode};
+use impromptu_sim::{
     condition::Condition,
-    experiment::{LaneRecipe, Loop, Recipe, dithered_logs, strongest_lane},
     flight_log::FlightLog,
+    flights::Loop,
     plant::Vehicle,
     rollout::FlightPlan,
     trajectory::{Trajectory, strokes},
 };
-use impromptu_model_export::{Description, FloatNetwork, Precision, description::LaneDescription, encode};
+use impromptu_training::{LaneRecipe, Recipe, dithered_logs, strongest_lane};
 
 /// The bar of the issue.
 const BAR: f64 = 1.5;
@@ -60,7 +61,7 @@ struct Outcome {
 /// Squared errors of a log's scored part.
 fn squares(log: &FlightLog) -> Vec<f64> {
     let rows = log.rows.get(log.scored.clone()).unwrap_or(&log.rows);
-    let square = |row: &impromptu_host_sim::flight_log::LogRow| {
+    let square = |row: &impromptu_sim::flight_log::LogRow| {
         let position = row.true_position.unwrap_or(row.measured_position);
         (0..3).map(|axis| (row.desired.position[axis] - position[axis]).powi(2)).sum::<f64>()
     };
