@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use impromptu_lti::{FeatureSet, fixtures, learn, learning::Settings};
+use impromptu_reproduction::siso::{FeatureSet, fixtures, learn, learning::Settings};
 
 fn main() {
     let settings = Settings::default();

@@ -6,7 +6,7 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use impromptu_host_sim::{
+use impromptu_sim::{
     condition::Condition,
     plant::{Disturbance, GRAVITY, LANES, Plant, State, States, Variation, Vehicle},
     rollout::{self, FlightPlan},

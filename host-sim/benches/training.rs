@@ -5,10 +5,10 @@
 //! with other work the fastest of many runs says more than the mean; the lines before Criterion's print it, with the median.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use impromptu_host_sim::training::matrix_kernel::multiply;
-use impromptu_host_sim::training::padded_matrix::PaddedMatrix;
-use impromptu_host_sim::training::{Dataset, NetworkTrainer, RowMatrix, TrainingSettings, train};
 use impromptu_model_export::float_network::Activation;
+use impromptu_training::supervised::{
+    Dataset, NetworkTrainer, RowMatrix, TrainingSettings, matrix_kernel::multiply, padded_matrix::PaddedMatrix, train,
+};
 use nalgebra::DMatrix;
 use std::hint::black_box;
 use std::time::Instant;

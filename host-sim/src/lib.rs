@@ -1,22 +1,11 @@
-//! Everything that runs on the PC: plant, weather, sensors, trajectories, closed-loop flights, training,
-//! design of the feedback lane, experiments, reports and the command line.
+//! The program `host-sim`: from a trajectory to a trained model, its flights and a report.
 //!
-//! SI units; world frame ENU (z up), body frame FLU, Hamilton quaternion body to world; f64 here, f32 in the firmware.
+//! What it does is in the crates below it: `impromptu-sim` flies, `impromptu-training` makes models, `impromptu-diagnosis` judges logs,
+//! `impromptu-pil` reaches the emulated board, `impromptu-experiment` is the main job, `impromptu-reproduction` the paper, and
+//! `impromptu-report` shows results. Here are only arguments, files and words.
+//!
+//! | layer | modules | what they hold |
+//! |---|---|---|
+//! | 1 | `cli` | the command line: a module for each command |
 
-pub mod channel;
 pub mod cli;
-pub mod condition;
-pub mod emulator;
-pub mod examples;
-pub mod experiment;
-pub mod feedback_design;
-pub mod flight_log;
-pub mod pil;
-pub mod plant;
-pub mod report;
-pub mod rollout;
-pub mod sensors;
-pub mod study;
-pub mod training;
-pub mod trajectory;
-pub mod weather;

@@ -10,4 +10,4 @@ pub mod link;
 pub mod mcu;
 pub mod structure;
 
-pub use impromptu_host_sim::emulator;
+pub use impromptu_pil::emulator;

@@ -5,21 +5,13 @@ use std::{
     sync::{LazyLock, Mutex},
 };
 
+use impromptu_experiment::demo::{DemoSettings, run};
 use impromptu_firmware::{adapter::Lanes, model::Model};
-use impromptu_host_sim::{
-    condition::Condition,
-    experiment::{
-        Loop, Purpose,
-        demo::{DemoSettings, Observer, run},
-        derived,
-    },
-    plant::Vehicle,
-    report::{Method, Results, Row},
-    rollout::FlightPlan,
-    study::robustness::{CASES, Comparison},
-    trajectory::strokes,
-};
+use impromptu_report::{Method, Results, Row};
+use impromptu_reproduction::robustness::{CASES, Comparison};
+use impromptu_sim::{condition::Condition, flights::Loop, plant::Vehicle, rollout::FlightPlan, trajectory::strokes};
 use impromptu_tests::{board, golden};
+use impromptu_training::{Purpose, derived, observer::Observer};
 
 struct Silent;
 

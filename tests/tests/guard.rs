@@ -10,15 +10,16 @@ use impromptu_firmware::{
     guard::{GuardSettings, Trip},
     model::Model,
 };
-use impromptu_host_sim::{
+use impromptu_model_export::{Description, FloatNetwork, Precision, description::LaneDescription, encode};
+use impromptu_sim::{
     condition::Condition,
-    experiment::{LaneRecipe, Loop, Recipe, dithered_logs, strongest_lane},
     flight_log::FlightLog,
+    flights::Loop,
     plant::Vehicle,
     rollout::FlightPlan,
     trajectory::{Trajectory, strokes},
 };
-use impromptu_model_export::{Description, FloatNetwork, Precision, description::LaneDescription, encode};
+use impromptu_training::{LaneRecipe, Recipe, dithered_logs, strongest_lane};
 
 /// The bar of the issue.
 const BAR: f64 = 1.5;
@@ -61,7 +62,7 @@ struct Outcome {
 /// Squared errors of a log's scored part.
 fn squares(log: &FlightLog) -> Vec<f64> {
     let rows = log.rows.get(log.scored.clone()).unwrap_or(&log.rows);
-    let square = |row: &impromptu_host_sim::flight_log::LogRow| {
+    let square = |row: &impromptu_sim::flight_log::LogRow| {
         let position = row.true_position.unwrap_or(row.measured_position);
         (0..3).map(|axis| (row.desired.position[axis] - position[axis]).powi(2)).sum::<f64>()
     };
@@ -158,7 +159,8 @@ fn a_network_with_wrong_weights_is_handed_over_in_time() {
         let plant = plant(vehicle, "lab");
         let trajectories = strokes(SEED, 12, 1.0, plant.rate_hz()).expect("strokes");
         let model = |description: &Description, network: &FloatNetwork| {
-            encode(&Description { feedback_lane: None, ..description.clone() }, Some(network), Precision::Float, &[]).expect("a model")
+            encode(&Description { feedback_lane: None, ..description.clone() }, Some(network), Precision::Float, &[])
+                .expect("a model")
         };
         let (description, network) = parts(other, "lab");
         let name = format!("weights of {other} on {vehicle}");

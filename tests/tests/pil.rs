@@ -2,15 +2,15 @@
 
 use impromptu_firmware::{adapter::Lanes, model::Model};
 use impromptu_flight::{link::message::Telemetry, replay::ANSWER};
-use impromptu_host_sim::{
+use impromptu_model_export::Precision;
+use impromptu_pil::{self as pil, Board, Faults, Faulty, LinkKind};
+use impromptu_sim::{
     condition::Condition,
-    experiment::Loop,
-    pil::{self, Board, Faults, Faulty, LinkKind},
+    flights::Loop,
     plant::Vehicle,
     rollout::{FlightPlan, fly_on},
     trajectory::strokes,
 };
-use impromptu_model_export::Precision;
 
 use crate::board::model;
 

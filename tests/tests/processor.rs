@@ -10,12 +10,12 @@ use impromptu_flight::{
     flight::Flight,
     types::{State, Tick},
 };
-use impromptu_host_sim::{
-    pil::{self, Board, CYCLES_PER_INSTRUCTION, LinkKind, PilReport},
+use impromptu_model_export::Precision;
+use impromptu_pil::{self as pil, Board, CYCLES_PER_INSTRUCTION, LinkKind, PilReport};
+use impromptu_sim::{
     rollout::{FlightPlan, fly_on, setpoint},
     trajectory::{Trajectory, strokes},
 };
-use impromptu_model_export::Precision;
 use impromptu_tests::mcu::counter;
 
 use crate::{board::model, pil::plant};

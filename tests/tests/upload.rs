@@ -9,15 +9,15 @@ use impromptu_flight::{
     link::{Reason, outcome::ModelFault},
     types::{Setpoint, State, Tick},
 };
-use impromptu_host_sim::{
+use impromptu_model_export::Precision;
+use impromptu_pil::{self as pil, Board, Faults, Faulty, Line, LinkKind, PilError};
+use impromptu_sim::{
     condition::Condition,
-    experiment::Loop,
-    pil::{self, Board, Faults, Faulty, Line, LinkKind, PilError},
+    flights::Loop,
     plant::Vehicle,
     rollout::{FlightPlan, FlightStack as _, fly_on},
     trajectory::strokes,
 };
-use impromptu_model_export::Precision;
 use impromptu_tests::emulator::{BOARD, build_firmware};
 
 use crate::{board::model, image};

@@ -2,14 +2,11 @@
 
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
+use impromptu_sim::{flight_log::FlightLog, rollout::Dither};
+use impromptu_training::{Excitation, Purpose, Recipe, Signal, files::write_log, observer::Observer as _};
 use serde::Serialize;
 
 use super::{Invocation, output::table, situation::Situation};
-use crate::{
-    experiment::{Excitation, Purpose, Recipe, Signal, demo::Observer as _},
-    flight_log::FlightLog,
-    rollout::Dither,
-};
 
 /// Flights of each kind unless told otherwise: the recipe's hundreds would be half a gigabyte of text.
 const FLIGHTS: u32 = 20;
@@ -105,7 +102,7 @@ impl Collect {
                 let kind = name(excitation.signal);
                 let dithered = if dither.is_some() { "-dithered" } else { "" };
                 let file = folder.join(format!("{index}-{kind}{dithered}-{flight:04}.csv"));
-                log.write(&file)?;
+                write_log(&log, &file)?;
                 logs.push(entry(log, file.display().to_string()));
             }
             first = first.wrapping_add(u64::from(excitation.flights));

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, anyhow};
 use garde::Validate;
+use impromptu_experiment::demo::DemoSettings;
+use impromptu_training::{Purpose, Recipe, derived};
 use serde::de::DeserializeOwned;
-
-use crate::experiment::{Purpose, Recipe, demo::DemoSettings, derived};
 
 /// Everything that a run is configured with.
 pub(super) struct Configuration {

@@ -3,12 +3,10 @@
 use std::path::Path;
 
 use anyhow::Result;
+use impromptu_experiment::demo;
+use impromptu_report::{Results, console_table, write_flights_csv, write_html, write_table_csv};
 
 use super::{Invocation, output};
-use crate::{
-    experiment::demo,
-    report::{Results, console_table, write_flights_csv, write_html, write_table_csv},
-};
 
 /// Runs the demo and shows what came of it.
 pub(super) fn run(invocation: &Invocation) -> Result<()> {

@@ -8,6 +8,18 @@ use std::path::PathBuf;
 use anyhow::{Context as _, Result, bail};
 use clap::{Args, ValueEnum};
 use impromptu_diagnosis::{Diagnosis, DiagnosisError, Record, Settings, diagnose};
+use impromptu_sim::{
+    flight_log::FlightLog,
+    flights::Loop,
+    rollout::FlightPlan,
+    trajectory::{Sample, Trajectory},
+};
+use impromptu_training::{
+    Excitation, Purpose, Recipe,
+    channel::{AXES, Channel, of_logs, read},
+    largest_sound_error,
+    observer::Observer as _,
+};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
@@ -15,13 +27,6 @@ use serde::Serialize;
 use super::{
     Invocation,
     situation::{milliseconds, plant},
-};
-use crate::{
-    channel::{AXES, Channel, of_logs, read},
-    experiment::{Excitation, Loop, Purpose, Recipe, demo::Observer as _, largest_sound_error},
-    flight_log::FlightLog,
-    rollout::FlightPlan,
-    trajectory::{Sample, Trajectory},
 };
 
 /// Arguments of `diagnose`.

@@ -4,7 +4,14 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, Result};
 use clap::Args;
+use impromptu_experiment::evaluation::per_flight;
 use impromptu_firmware::adapter::Lanes;
+use impromptu_report::{Method, PerFlight, Row, summarise};
+use impromptu_sim::{
+    flights::Loop,
+    trajectory::{Trajectory, strokes},
+};
+use impromptu_training::{Purpose, observer::Observer as _};
 use serde::Serialize;
 
 use super::{
@@ -12,11 +19,6 @@ use super::{
     model_file::{ModelFile, method},
     output::{number, table},
     situation::{Situation, milliseconds, speed},
-};
-use crate::{
-    experiment::{Loop, Purpose, demo::Observer as _, per_flight},
-    report::{Method, PerFlight, Row, summarise},
-    trajectory::{Trajectory, strokes},
 };
 
 /// Arguments of `evaluate`.

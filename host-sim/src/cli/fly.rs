@@ -4,10 +4,18 @@ use std::{collections::BTreeMap, path::PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 use clap::{Args, ValueEnum};
+use impromptu_experiment::evaluation::per_flight;
 use impromptu_firmware::{
     adapter::Lanes,
     guard::{Trip, Trips},
 };
+use impromptu_pil::LinkKind;
+use impromptu_report::{Method, PerFlight};
+use impromptu_sim::{
+    rollout::{FlightPlan, FlightRecord},
+    trajectory::strokes,
+};
+use impromptu_training::{Purpose, files::write_log};
 use serde::Serialize;
 
 use super::{
@@ -17,13 +25,6 @@ use super::{
     processor::Flights,
     situation::{Situation, milliseconds, speed},
     trajectory,
-};
-use crate::{
-    experiment::{Purpose, per_flight},
-    pil::LinkKind,
-    report::{Method, PerFlight},
-    rollout::{FlightPlan, FlightRecord},
-    trajectory::strokes,
 };
 
 /// Arguments of `fly`.
@@ -168,7 +169,7 @@ impl Fly {
         let records =
             plant.fly(&plans).with_context(|| file.as_ref().map_or_else(|| trajectory.name.clone(), ModelFile::name))?;
         if let Some(path) = &self.log {
-            write_log(&records, path)?;
+            write_last(&records, path)?;
             invocation.console.note(&format!("log: {}", path.display()));
         }
         let baseline = records[0].rms;
@@ -188,15 +189,15 @@ impl Fly {
     }
 }
 
-fn write_log(records: &[FlightRecord], path: &std::path::Path) -> Result<()> {
+fn write_last(records: &[FlightRecord], path: &std::path::Path) -> Result<()> {
     let Some(log) = records.last().and_then(|record| record.log.as_ref()) else { return Ok(()) };
-    let finite = |row: &crate::flight_log::LogRow| {
+    let finite = |row: &impromptu_sim::flight_log::LogRow| {
         row.measured_position.iter().chain(&row.true_position.unwrap_or_default()).all(|x| x.is_finite())
     };
     if !log.rows.iter().all(finite) {
         bail!("{}: not written, the flight left the numbers; fly slower or with other gains", path.display());
     }
-    Ok(log.write(path)?)
+    Ok(write_log(log, path)?)
 }
 
 fn text(flown: &Flown) -> String {

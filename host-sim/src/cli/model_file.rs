@@ -8,9 +8,9 @@ use impromptu_firmware::{
     features::{Relative, Source},
     model::{Arithmetic, Model},
 };
+use impromptu_report::Method;
 
 use super::situation::Situation;
-use crate::report::Method;
 
 /// The bytes of a model file.
 pub(super) struct ModelFile {

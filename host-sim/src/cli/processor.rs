@@ -1,20 +1,18 @@
 //! `host-sim fly --pil`: flights through the firmware on the emulated microcontroller.
 
 use anyhow::{Context as _, Result, bail};
+use impromptu_experiment::evaluation::per_flight;
 use impromptu_firmware::adapter::Lanes;
+use impromptu_pil::{self as pil, LinkKind, PilReport};
+use impromptu_report::{Method, PerFlight, Row, summarise};
+use impromptu_sim::{flights::Loop, rollout::FlightPlan, trajectory::Trajectory};
+use impromptu_training::{Purpose, observer::Observer as _};
 use serde::Serialize;
 
 use super::{
     Invocation,
     model_file::{ModelFile, method},
     output::{number, table},
-};
-use crate::{
-    experiment::{Loop, Purpose, demo::Observer as _, per_flight},
-    pil::{self, LinkKind, PilReport},
-    report::{Method, PerFlight, Row, summarise},
-    rollout::FlightPlan,
-    trajectory::Trajectory,
 };
 
 /// Nanoseconds of an instruction as a power of two: 125 million instructions a second, about what 168 MHz give.

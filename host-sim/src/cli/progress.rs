@@ -6,9 +6,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use impromptu_training::observer::Observer;
 use indicatif::{ProgressBar, ProgressStyle};
-
-use crate::experiment::demo::Observer;
 
 /// Time between two plain lines.
 const LINE_INTERVAL: Duration = Duration::from_secs(5);

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, Result};
 use clap::Args;
+use impromptu_report::Results;
 
 use super::{Invocation, demo};
-use crate::report::Results;
 
 /// Arguments of `report`.
 #[derive(Debug, Args)]

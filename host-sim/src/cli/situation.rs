@@ -4,14 +4,14 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
+use impromptu_sim::{condition::Condition, flights::Loop, plant::Vehicle};
 
 use super::configuration::toml;
-use crate::{condition::Condition, experiment::Loop, plant::Vehicle};
 
 /// Vehicle, gains and condition.
 #[derive(Debug, Args)]
 pub(super) struct Situation {
-    /// Vehicle: crazyflie, crazyflie-brushless, hummingbird, or a file of the same form as host-sim/vehicles/*.toml.
+    /// Vehicle: crazyflie, crazyflie-brushless, hummingbird, or a file of the same form as host-sim/sim/vehicles/*.toml.
     #[arg(long, value_name = "NAME|FILE.toml", default_value = "crazyflie")]
     pub(super) vehicle: String,
     /// Gains of the position loop, named in the vehicle's data.

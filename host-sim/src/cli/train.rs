@@ -13,6 +13,11 @@ use impromptu_model_export::{
     description::{LaneDescription, Provenance, Timing},
     encode,
 };
+use impromptu_sim::{flight_log::FlightLog, flights::Loop};
+use impromptu_training::{
+    AxisGates, Candidates, Judge, Learned, Purpose, Recipe, Rows, best_in_flight, check_gates, derived, describe, learn, monitor,
+    observer::Observer as _, promise, smoothing, supervised::Progress, validation_strokes, write_model_files,
+};
 use serde::Serialize;
 
 use super::{
@@ -20,14 +25,6 @@ use super::{
     configuration::checked,
     output::table,
     situation::{milliseconds, plant},
-};
-use crate::{
-    experiment::{
-        AxisGates, Candidates, Judge, Learned, Loop, Purpose, Recipe, Rows, best_in_flight, check_gates, demo::Observer as _,
-        derived, describe, learn, monitor, promise, smoothing, validation_strokes, write_model_files,
-    },
-    flight_log::FlightLog,
-    training::Progress,
 };
 
 /// Arguments of `train`.
@@ -132,7 +129,7 @@ impl Train {
             let flight_seed = derived(seed, Purpose::Validation);
             let (recipe, validation) = (&recipe, &validation);
             move |candidates: Candidates<'_>, rows: &Rows| {
-                best_in_flight(recipe, plant, validation, flight_seed, candidates, rows)
+                Ok(best_in_flight(recipe, plant, validation, flight_seed, candidates, rows)?)
             }
         });
         let judge = in_flight.as_ref().map(|judge| judge as &Judge<'_>);

@@ -7,9 +7,9 @@ use std::{
 
 use anyhow::Result;
 use clap::Args;
+use impromptu_sim::trajectory::{DEFAULT_RATE_HZ, KNOWN_NAMES, Motion, by_name, load};
 
 use super::{Invocation, output, situation::speed};
-use crate::trajectory::{DEFAULT_RATE_HZ, KNOWN_NAMES, Motion, by_name, load};
 
 /// Arguments of `trajectory`.
 #[derive(Debug, Args)]

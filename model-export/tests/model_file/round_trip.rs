@@ -171,7 +171,10 @@ fn what_does_not_fit_is_named() {
     same(refusal(&|d, _| d.timing.fade_s = -1.0, &good), "`timing.fade_s` is -1 s");
     same(refusal(&|d, _| d.timing.fade_s = 1e9, &good), "`timing.fade_s`");
     same(refusal(&|d, _| d.feedback_lane.as_mut().unwrap().axes[0].errors.truncate(1), &good), "lists of error coefficients");
-    same(refusal(&|d, _| d.feedback_lane.as_mut().unwrap().axes[0].error_coefficients[1].push(0.0), &good), "lags of the feedback lane");
+    same(
+        refusal(&|d, _| d.feedback_lane.as_mut().unwrap().axes[0].error_coefficients[1].push(0.0), &good),
+        "lags of the feedback lane",
+    );
     same(
         refusal(&|d, _| d.feedback_lane.as_mut().unwrap().axes[0].output_coefficients = vec![0.0; 257], &good),
         "257, the firmware holds at most 32",

@@ -72,7 +72,9 @@ impl Module {
         match item {
             Item::Mod(inner) if inner.content.is_none() => {
                 let name = inner.ident.to_string();
-                let child = placed(file, &inner.attrs).or_else(|| below(file, &name)).with_context(|| format!("module {name} of {} has no file", file.display()))?;
+                let child = placed(file, &inner.attrs)
+                    .or_else(|| below(file, &name))
+                    .with_context(|| format!("module {name} of {} has no file", file.display()))?;
                 self.children.push(Self::read(&child, &format!("{}::{name}", self.path))?);
                 return Ok(());
             }

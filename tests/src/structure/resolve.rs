@@ -40,7 +40,10 @@ fn resolve(root: &Module, from: &str, path: &[String], depth: usize) -> Option<S
     for import in &here.imports {
         match &import.name {
             // A name may have the name of the crate or module it comes from.
-            Some(known) if known == name && import.path.first() != Some(name) || import.path.len() > 1 && import.name.as_ref() == Some(name) => {
+            Some(known)
+                if known == name && import.path.first() != Some(name)
+                    || import.path.len() > 1 && import.name.as_ref() == Some(name) =>
+            {
                 let whole: Vec<String> = import.path.iter().chain(after).cloned().collect();
                 return resolve(root, &here.path, &whole, depth);
             }
@@ -60,5 +63,8 @@ fn resolve(root: &Module, from: &str, path: &[String], depth: usize) -> Option<S
 fn knows(module: &Module, name: &str) -> bool {
     module.children.iter().any(|child| child.name() == name)
         || module.defined.contains(name)
-        || module.imports.iter().any(|import| import.name.as_deref() == Some(name) && import.path.first().is_none_or(|first| first != name))
+        || module
+            .imports
+            .iter()
+            .any(|import| import.name.as_deref() == Some(name) && import.path.first().is_none_or(|first| first != name))
 }

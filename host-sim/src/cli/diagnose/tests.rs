@@ -1,7 +1,7 @@
 use impromptu_diagnosis::{Settings, add_on::AddOn, assess, diagnose, prediction::root_mean_square, properties::Interval};
+use impromptu_sim::trajectory::Trajectory;
 
 use super::*;
-use crate::trajectory::Trajectory;
 
 /// The trajectory that the add-on makes of a desired one, axis by axis: its taps lie `divisor` ticks apart, at every tick anew.
 fn adapted(desired: &Trajectory, add_ons: &[(AddOn, usize); 3]) -> Trajectory {

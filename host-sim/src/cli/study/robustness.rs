@@ -5,25 +5,22 @@ use std::path::PathBuf;
 use anyhow::{Context as _, Result, anyhow};
 use clap::Args;
 use impromptu_firmware::model::Model;
+use impromptu_report::study::Study;
+use impromptu_reproduction::robustness::{
+    Settings,
+    draw::{DrawSettings, Ranges, slug},
+    draws::fly_draws,
+    ledger::{Header, Shard, merge},
+    run, spread,
+};
+use impromptu_training::{build, observer::Observer as _};
 
-use super::show;
-use crate::{
-    cli::{
-        Invocation, configuration,
-        model_file::ModelFile,
-        output::write,
-        situation::{Situation, plant},
-    },
-    experiment::{build, demo::Observer as _},
-    study::{
-        Study,
-        robustness::{
-            Settings,
-            draws::{DrawSettings, Ranges, fly_draws, slug},
-            ledger::{Header, Shard, merge},
-            run, spread,
-        },
-    },
+use super::found::show;
+use crate::cli::{
+    Invocation, configuration,
+    model_file::ModelFile,
+    output::write,
+    situation::{Situation, plant},
 };
 
 /// Arguments of `study robustness`.

@@ -1,13 +1,10 @@
 //! The feedback lane of a model that is trained from files.
 
 use impromptu_model_export::{ExportError, description::LaneDescription};
+use impromptu_sim::{flight_log::FlightLog, flights::Loop, trajectory::Trajectory};
+use impromptu_training::{LaneChoice, Purpose, Recipe, choose_lane};
 
 use super::super::Invocation;
-use crate::{
-    experiment::{LaneChoice, Loop, Purpose, Recipe, choose_lane},
-    flight_log::FlightLog,
-    trajectory::Trajectory,
-};
 
 /// Designs lanes from `logs` and chooses one by flights of `plant` over the `validation` trajectories, or says why there is none.
 pub(super) fn choose(

@@ -1,0 +1,181 @@
+//! Flights of every method over the test strokes.
+
+use impromptu_firmware::{adapter::Lanes, model::Model};
+use impromptu_model_export::{ExportError, verify};
+use impromptu_report::{FlightTrace, LaneOutcome, Margins, Method, ModelCard, PerFlight};
+use impromptu_sim::{
+    flight_log::FlightLog,
+    flights::Loop,
+    rollout::{FlightPlan, RolloutError},
+    trajectory::Trajectory,
+};
+use impromptu_training::build::Built;
+
+const NETWORK: Lanes = Lanes { network: true, feedback: false };
+const FEEDBACK: Lanes = Lanes { network: false, feedback: true };
+
+/// Why nothing was evaluated.
+#[derive(Debug, thiserror::Error)]
+pub enum EvaluationError {
+    /// Flights failed.
+    #[error(transparent)]
+    Rollout(#[from] RolloutError),
+    /// A model file is refused.
+    #[error(transparent)]
+    Export(#[from] ExportError),
+}
+
+/// The file and the lanes of a method; `None` for the baseline.
+fn flown_by(built: &Built, method: Method) -> Option<(&[u8], Lanes)> {
+    let models = &built.models;
+    let (bytes, lanes) = match method {
+        Method::Baseline => return None,
+        Method::Feedforward => (&models.feedforward, NETWORK),
+        Method::Feedback => (&models.feedforward, FEEDBACK),
+        Method::FeedforwardFeedback => (&models.feedforward, Lanes::BOTH),
+        Method::Ridge => (&models.ridge, NETWORK),
+        Method::NetF32 => (&models.float, NETWORK),
+        Method::NetInt8 => (&models.int8, NETWORK),
+        Method::FullRidge => (&models.ridge, Lanes::BOTH),
+        Method::FullF32 => (&models.float, Lanes::BOTH),
+        Method::FullInt8 => (&models.int8, Lanes::BOTH),
+    };
+    Some((bytes, lanes))
+}
+
+/// Flies every method over the trajectories; one entry for each flight.
+///
+/// # Errors
+/// If a model is refused or a flight cannot be flown.
+pub fn evaluate(
+    built: &Built,
+    plant: &Loop,
+    trajectories: &[Trajectory],
+    speed: f64,
+    flight_seed: u64,
+    seed: u64,
+) -> Result<Vec<PerFlight>, EvaluationError> {
+    let baseline = plant.errors(trajectories, None, 1.0, flight_seed)?;
+    let unguarded = plant.unguarded();
+    let mut flights = Vec::new();
+    for method in Method::ALL {
+        let errors = match flown_by(built, method) {
+            None => baseline.clone(),
+            Some((bytes, lanes)) => {
+                let model = Model::from_bytes(bytes).map_err(ExportError::Refused)?;
+                // The guard hands over what it would cost the comparisons: they fly without.
+                let watched = matches!(method, Method::NetF32 | Method::NetInt8 | Method::FullF32 | Method::FullInt8);
+                let plant = if watched { plant } else { &unguarded };
+                plant.errors(trajectories, Some((&model, lanes)), 1.0, flight_seed)?
+            }
+        };
+        flights.extend(per_flight(plant, trajectories, speed, method, &errors, &baseline, seed));
+    }
+    Ok(flights)
+}
+
+/// Flights as they are reported, of their RMS errors and the baseline's over the same trajectories, m.
+pub fn per_flight(
+    plant: &Loop,
+    trajectories: &[Trajectory],
+    speed: f64,
+    method: Method,
+    errors: &[f64],
+    baseline: &[f64],
+    seed: u64,
+) -> Vec<PerFlight> {
+    let flights = trajectories.iter().zip(errors).zip(baseline);
+    let report = |((trajectory, error), baseline): ((&Trajectory, &f64), &f64)| PerFlight {
+        vehicle: plant.vehicle.name.clone(),
+        gains: plant.gains.clone(),
+        condition: plant.condition.name.clone(),
+        speed,
+        method,
+        trajectory: trajectory.name.clone(),
+        rms_cm: 100.0 * error,
+        reduction: 100.0 * (1.0 - error / baseline),
+        seed,
+    };
+    flights.map(report).collect()
+}
+
+/// Full records of a few flights: the baseline, the network lane alone, and both lanes.
+///
+/// # Errors
+/// As [`evaluate`].
+pub fn traces(
+    built: &Built,
+    plant: &Loop,
+    trajectories: &[Trajectory],
+    speed: f64,
+    flight_seed: u64,
+) -> Result<Vec<(FlightTrace, FlightLog)>, EvaluationError> {
+    let model = Model::from_bytes(&built.models.int8).map_err(ExportError::Refused)?;
+    let mut traces = Vec::new();
+    for (method, lanes) in [(Method::Baseline, None), (Method::NetInt8, Some(NETWORK)), (Method::FullInt8, Some(Lanes::BOTH))] {
+        let plans: Vec<FlightPlan<'_>> = trajectories
+            .iter()
+            .zip(flight_seed..)
+            .map(|(trajectory, seed)| FlightPlan {
+                model: lanes.map(|lanes| (&model, lanes)),
+                log: true,
+                ..FlightPlan::new(trajectory, seed)
+            })
+            .collect();
+        for (record, trajectory) in plant.fly(&plans)?.into_iter().zip(trajectories) {
+            let Some(log) = record.log else { continue };
+            let trace = FlightTrace {
+                trajectory: trajectory.name.clone(),
+                vehicle: plant.vehicle.name.clone(),
+                gains: plant.gains.clone(),
+                condition: plant.condition.name.clone(),
+                speed,
+                method,
+                rate_hz: log.rate_hz,
+                desired: log.rows.iter().map(|row| row.desired.position).collect(),
+                flown: log.rows.iter().map(|row| row.true_position.unwrap_or(row.measured_position)).collect(),
+                reference: log.rows.iter().map(|row| row.reference_position).collect(),
+                scored: trajectory.scored.clone(),
+            };
+            traces.push((trace, log));
+        }
+    }
+    Ok(traces)
+}
+
+/// What is said of the flashed model.
+///
+/// # Errors
+/// If the file is refused.
+pub fn model_card(built: &Built, plant: &Loop) -> Result<ModelCard, ExportError> {
+    let bytes = &built.models.int8;
+    let model = Model::from_bytes(bytes).map_err(ExportError::Refused)?;
+    let card = model.card();
+    let network = &built.learned.quantised;
+    let dense: usize = network.layers.iter().map(|layer| layer.weights.len() + layer.bias.len()).sum();
+    let skip = network.skip.as_ref().map_or(0, Vec::len);
+    let difference = verify::difference(&model, network, &built.learned.rows.calibration);
+    let position = &difference.rms[..3.min(difference.rms.len())];
+    let square = position.iter().map(|rms| rms * rms).sum::<f64>();
+    let lane_parameters = model.lane().map_or(0, |lane| lane.multiply_adds());
+    Ok(ModelCard {
+        name: card.name.into(),
+        vehicle: plant.vehicle.name.clone(),
+        gains: plant.gains.clone(),
+        condition: plant.condition.name.clone(),
+        bytes: bytes.len() as u64,
+        crc32: model.checksum(),
+        parameters: (dense + skip) as u64 + u64::from(lane_parameters),
+        multiply_adds: u64::from(model.network().map_or(0, |network| network.multiply_adds())) + u64::from(lane_parameters),
+        margins: card.lane.as_ref().map(|lane| Margins {
+            delay_ms: lane.margins.delay_ms.into(),
+            gain: lane.margins.gain.into(),
+            modulus: lane.margins.modulus.into(),
+        }),
+        lane: match &built.lane {
+            Ok(choice) => LaneOutcome::Chosen(choice.design.clone()),
+            Err(reason) => LaneOutcome::Refused(reason.to_string()),
+        },
+        quantisation_rms_mm: Some(1e3 * square.sqrt()),
+    })
+}

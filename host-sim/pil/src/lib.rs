@@ -1,0 +1,38 @@
+//! Processor in the loop: the plant here, the flight stack in the binary that is flashed.
+//!
+//! *in* flight plans; *out* the flights that the microcontroller flew, and what it measured of itself; *never* another bit than the
+//! software's, if the link is perfect; *source* the link is `impromptu_flight::link`.
+//!
+//! At the bottom is what a link and an emulator are by themselves: lines of bytes, QEMU with the build of what it runs, the flash of a binary.
+//! A [`Board`] speaks the firmware's protocol over a line and is a flight stack like the software's; above it a model is uploaded, an
+//! emulated board started, and flights are flown with both and compared bit by bit.
+//!
+//! | layer | modules | what they hold |
+//! |---|---|---|
+//! | 1 | `line`, `emulator`, `flash`, `error` | bytes to and from the firmware; builds and QEMU; models in an ELF file; why nothing flies |
+//! | 2 | `lockstep`, `serial`, `faults`, `board` | lines through FIFOs, a socket, or with faults; the microcontroller as a flight stack |
+//! | 3 | `connection`, `upload`, `flights` | kinds of link, and what each needs of the system; a model over the link; flights beside the software's |
+//! | 4 | `emulated` | the emulated board with a model in its flash |
+
+mod board;
+mod connection;
+mod emulated;
+pub mod emulator;
+mod error;
+mod faults;
+mod flash;
+mod flights;
+mod line;
+#[cfg(unix)]
+mod lockstep;
+#[cfg(unix)]
+mod serial;
+mod upload;
+
+pub use board::{Board, Figures};
+pub use connection::LinkKind;
+pub use emulated::{Emulated, connect, firmware, restart, start};
+pub use error::PilError;
+pub use faults::{Faults, Faulty};
+pub use flights::{CYCLES_PER_INSTRUCTION, PilReport, fly};
+pub use line::Line;

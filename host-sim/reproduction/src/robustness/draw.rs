@@ -1,0 +1,173 @@
+//! What is drawn, and what a drawn vehicle flew.
+//!
+//! *in* ranges and a seed; *out* the vehicle and the air of each draw; *never* a draw that depends on other draws.
+
+use impromptu_firmware::{
+    guard::{GuardSettings, Trip},
+    model::Model,
+};
+use impromptu_sim::flights::Loop;
+use impromptu_training::{Purpose, derived};
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use serde::{Deserialize, Serialize};
+
+use super::mismatch::Mismatch;
+
+/// From where to where each quantity is drawn, uniformly.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Ranges {
+    /// Factor on the mass.
+    pub mass: [f64; 2],
+    /// Factor on the thrust.
+    pub thrust: [f64; 2],
+    /// Factor on rotor and frame drag.
+    pub drag: [f64; 2],
+    /// Factor on the inertia.
+    pub inertia: [f64; 2],
+    /// Factor on the motors' time constant.
+    pub motor_lag: [f64; 2],
+    /// Further delay of the loop's commands, s.
+    pub delay_s: [f64; 2],
+    /// Mean wind, m/s, from any side.
+    pub wind: [f64; 2],
+}
+
+impl Default for Ranges {
+    /// What a builder of small vehicles does not know better: a battery or a deck of a tenth of the mass, a battery between full and
+    /// nearly empty, other propellers, a link that is at most 20 ms later, moving air indoors.
+    fn default() -> Self {
+        Self {
+            mass: [0.95, 1.15],
+            thrust: [0.88, 1.04],
+            drag: [0.5, 2.0],
+            inertia: [0.8, 1.25],
+            motor_lag: [0.8, 1.25],
+            delay_s: [0.0, 0.02],
+            wind: [0.0, 2.0],
+        }
+    }
+}
+
+impl Ranges {
+    /// The first range that no vehicle can be drawn from, and why.
+    pub fn fault(&self) -> Option<String> {
+        let factors = [("mass", self.mass), ("thrust", self.thrust), ("inertia", self.inertia), ("motor_lag", self.motor_lag)];
+        let others = [("drag", self.drag), ("delay_s", self.delay_s), ("wind", self.wind)];
+        let ordered = |[low, high]: [f64; 2]| low.is_finite() && high.is_finite() && low <= high;
+        let positive = factors.iter().find(|(_, range)| !ordered(*range) || range[0] <= 0.0);
+        let positive = positive.map(|(name, _)| format!("`{name}` must be two factors above 0, the smaller one first"));
+        let rest = others.iter().find(|(_, range)| !ordered(*range) || range[0] < 0.0);
+        positive.or(rest.map(|(name, _)| format!("`{name}` must be two numbers, 0 or more, the smaller one first")))
+    }
+}
+
+/// Everything that decides what is drawn and flown.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DrawSettings {
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Draws of the whole run, over all shards.
+    pub draws: u32,
+    /// Strokes that each draw flies.
+    pub strokes: usize,
+    /// Ranges.
+    pub ranges: Ranges,
+    /// Vehicle, gains and condition in words.
+    pub nominal: String,
+    /// CRC-32 of all constants of the nominal loop.
+    pub nominal_crc32: u32,
+    /// CRC-32 of the model file.
+    pub model_crc32: u32,
+    /// Program that flies.
+    pub software: String,
+}
+
+impl DrawSettings {
+    /// Settings for a loop and a model.
+    pub fn new(plant: &Loop, model: &Model<'_>, seed: u64, draws: u32, strokes: usize, ranges: Ranges) -> Self {
+        let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+        // The guard's settings are part of the software; vehicle, stack and condition can come from files.
+        let constants = serde_json::json!([plant.vehicle, plant.settings, plant.condition, plant.guard == GuardSettings::OFF]);
+        Self {
+            seed,
+            draws,
+            strokes,
+            ranges,
+            nominal: name(plant),
+            nominal_crc32: crc.checksum(constants.to_string().as_bytes()),
+            model_crc32: model.checksum(),
+            software: format!("host-sim {}", env!("CARGO_PKG_VERSION")),
+        }
+    }
+
+    /// The vehicle and the air of a draw.
+    pub fn mismatch(&self, draw: u32) -> Mismatch {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(derived(self.seed, Purpose::Test) ^ (u64::from(draw) << 20));
+        let mut between = |[low, high]: [f64; 2]| low + (high - low) * random.random::<f64>();
+        let ranges = &self.ranges;
+        Mismatch {
+            mass: between(ranges.mass),
+            thrust: between(ranges.thrust),
+            drag: between(ranges.drag),
+            inertia: between(ranges.inertia),
+            motor_lag: between(ranges.motor_lag),
+            delay_s: between(ranges.delay_s),
+            wind: between(ranges.wind),
+            wind_direction: between([0.0, std::f64::consts::TAU]),
+            ..Mismatch::NONE
+        }
+    }
+}
+
+/// What one vehicle flew.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Draw {
+    /// Number of the draw, from 0.
+    pub draw: u32,
+    /// The vehicle and its air.
+    pub mismatch: Mismatch,
+    /// RMS errors without the add-on, m; nothing for a flight that left the numbers.
+    pub baseline: Vec<Option<f64>>,
+    /// With the network lane alone.
+    pub network: Vec<Option<f64>>,
+    /// With both lanes.
+    pub both: Vec<Option<f64>>,
+    /// Flights with both lanes in which the guard tripped a lane.
+    pub tripped: u32,
+    /// Trips in them, by the reasons' indices.
+    pub trips: [u32; Trip::ALL.len()],
+}
+
+impl Draw {
+    /// Reductions of the draw's flights with the given errors, per cent; a flight that left the numbers counts -100 %, or nothing where
+    /// the baseline did so too.
+    pub fn reductions(&self, errors: &[Option<f64>]) -> Vec<f64> {
+        let flights = self.baseline.iter().zip(errors);
+        flights
+            .filter_map(|flight| match flight {
+                (Some(baseline), Some(error)) => Some((100.0 * (1.0 - error / baseline)).max(-100.0)),
+                (Some(_), None) => Some(-100.0),
+                (None, _) => None,
+            })
+            .collect()
+    }
+}
+
+/// Vehicle, gains and condition of a loop in words.
+pub fn name(plant: &Loop) -> String {
+    format!("{} {} {}", plant.vehicle.name, plant.gains, plant.condition.name)
+}
+
+/// The name of a loop as the beginning of names in the JSON document and of files.
+pub fn slug(nominal: &str) -> String {
+    nominal.replace([' ', '-', '+'], "_")
+}
+
+/// The same of a loop.
+pub(super) fn slug_of(plant: &Loop) -> String {
+    slug(&name(plant))
+}

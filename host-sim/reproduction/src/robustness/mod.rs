@@ -1,0 +1,83 @@
+//! Robustness: what is left of the gain when vehicle, loop and air are not those of the training, and what it costs to keep it.
+//!
+//! *in* settings; *out* a [`Study`]; *never* a model or a lane that was chosen on the flights that are shown here; *source* Zhou 2017
+//! section V (a vehicle and its model) and the pilot study, "at test time only".
+
+mod cases;
+mod comparison;
+mod deviations;
+pub mod draw;
+pub mod draws;
+pub mod effort;
+pub mod gaussian;
+pub mod hover;
+pub mod ledger;
+mod mismatch;
+mod report;
+mod settings;
+pub mod spread;
+#[cfg(test)]
+mod tests;
+
+use anyhow::Context as _;
+use impromptu_firmware::model::Model;
+use impromptu_report::study::Study;
+use impromptu_sim::{flights::Loop, trajectory::strokes};
+use impromptu_training::{Purpose, build, derived, observer::Observer};
+use rayon::prelude::*;
+
+pub use cases::{CASES, Case, DEVIATIONS, PARAMETERS, Parameter, WINDS, wind};
+pub use comparison::Comparison;
+pub use deviations::{Deviations, fly_cases, fly_deviations};
+pub use draw::name;
+pub use mismatch::Mismatch;
+pub use settings::Settings;
+
+use self::{
+    draw::{DrawSettings, slug_of},
+    draws::fly_draws,
+    ledger::{Header, Shard},
+};
+
+/// Runs the whole study.
+///
+/// # Errors
+/// If a model cannot be built or flown, or the draws in the folder are those of another run.
+pub fn run(settings: &Settings, command: &str, observer: &dyn Observer) -> anyhow::Result<Study> {
+    let parts: Vec<Study> = settings
+        .loops
+        .par_iter()
+        .map(|plant| study_loop(settings, plant, observer).with_context(|| name(plant)))
+        .collect::<anyhow::Result<_>>()?;
+    let mut study = Study::new("Robustness of the add-on", command, settings.seed);
+    report::explain(&mut study, settings);
+    for part in parts {
+        study.findings.extend(part.findings);
+        study.figures.extend(part.figures);
+        study.notes.extend(part.notes);
+    }
+    Ok(study)
+}
+
+fn study_loop(settings: &Settings, plant: &Loop, observer: &dyn Observer) -> anyhow::Result<Study> {
+    let mut study = Study::new("", "", settings.seed);
+    let name = name(plant);
+    observer.stage(&format!("{name}: building the model"));
+    let built = build(&settings.recipe, plant, settings.seed, &mut |_| {})?;
+    let model = Model::from_bytes(&built.models.int8)?;
+    let seed = derived(settings.seed, Purpose::Test);
+    let trajectories = strokes(seed, settings.strokes, 1.0, plant.rate_hz())?;
+    observer.stage(&format!("{name}: cases and deviations"));
+    report::tell_cases(&mut study, plant, &fly_cases(plant, &model, &trajectories, seed)?);
+    report::draw_deviations(&mut study, plant, &fly_deviations(plant, &model, &trajectories, seed)?);
+    observer.stage(&format!("{name}: {} vehicles drawn", settings.draws));
+    let path = settings.out.join(format!("draws-{}.jsonl", slug_of(plant)));
+    let draws = DrawSettings::new(plant, &model, settings.seed, settings.draws, settings.draw_strokes, settings.ranges.clone());
+    let content = fly_draws(&Header { settings: draws, shard: Shard::WHOLE }, plant, &model, &path, &|_, _| {})?;
+    spread::tell(&mut study, &slug_of(plant), &content);
+    observer.stage(&format!("{name}: effort of the feedback lane"));
+    let designs = effort::sweep(&settings.recipe, plant, &built, &trajectories, settings.seed, seed)?;
+    let baseline = plant.errors(&trajectories, None, 1.0, seed)?;
+    report::draw_effort(&mut study, plant, &designs, &baseline)?;
+    Ok(study)
+}

@@ -1,0 +1,108 @@
+//! What flies a vehicle: the flight stack in this program, or the same one in a microcontroller.
+//!
+//! *in* setpoints ahead of time, and the state at each control tick; *out* motor commands; *never* a time of its own; *source* the calls of
+//! [`impromptu_flight::flight::Flight`].
+
+use impromptu_firmware::{guard::Trips, network::Scratch};
+use impromptu_flight::{
+    flight::{Flight, Settings},
+    types::{MotorCommand, Reference, Setpoint, State, Tick},
+};
+use nalgebra::Vector3;
+
+use super::plan::{FlightPlan, RolloutError};
+use crate::{condition::Condition, plant::Vehicle};
+
+/// A flight stack, on the ground or in flight.
+pub trait FlightStack {
+    /// Appends the desired state of the next reference tick.
+    fn push_setpoint(&mut self, setpoint: &Setpoint);
+    /// Reference tick of the next setpoint.
+    fn next_setpoint(&self) -> i32;
+    /// Offsets the position reference, m, world ENU.
+    fn excite(&mut self, offset: Vector3<f32>);
+    /// One control tick.
+    fn step(&mut self, tick: Tick, state: &State) -> MotorCommand;
+    /// The reference that the loop tracks now.
+    fn reference(&self) -> &Reference;
+    /// Trips of the guard so far.
+    fn trips(&mut self) -> Trips;
+}
+
+impl<S: FlightStack> FlightStack for &mut S {
+    fn push_setpoint(&mut self, setpoint: &Setpoint) {
+        S::push_setpoint(self, setpoint);
+    }
+
+    fn next_setpoint(&self) -> i32 {
+        S::next_setpoint(self)
+    }
+
+    fn excite(&mut self, offset: Vector3<f32>) {
+        S::excite(self, offset);
+    }
+
+    fn step(&mut self, tick: Tick, state: &State) -> MotorCommand {
+        S::step(self, tick, state)
+    }
+
+    fn reference(&self) -> &Reference {
+        S::reference(self)
+    }
+
+    fn trips(&mut self) -> Trips {
+        S::trips(self)
+    }
+}
+
+/// The flight stack in this program.
+pub(super) struct Software<'a> {
+    flight: Flight<'a>,
+    scratch: Scratch,
+}
+
+impl<'a> Software<'a> {
+    pub(super) fn new(
+        vehicle: &Vehicle,
+        settings: &Settings,
+        condition: &Condition,
+        plan: &FlightPlan<'a>,
+    ) -> Result<Self, RolloutError> {
+        let mut flight = Flight::new(settings).ok_or_else(|| RolloutError::Airframe(vehicle.name.clone()))?;
+        if let Some((model, lanes)) = plan.model {
+            flight.attach(model, settings, lanes)?;
+            if let Some(adapter) = flight.adapter() {
+                adapter.set_loop_gain(plan.loop_gain);
+                adapter.set_guard(plan.guard);
+            }
+        }
+        flight.set_command_delay(condition.command_delay_ticks(settings.rates.control_hz.into()));
+        Ok(Self { flight, scratch: Scratch::new() })
+    }
+}
+
+impl FlightStack for Software<'_> {
+    fn push_setpoint(&mut self, setpoint: &Setpoint) {
+        self.flight.push_setpoint(setpoint);
+    }
+
+    fn next_setpoint(&self) -> i32 {
+        self.flight.next_setpoint()
+    }
+
+    fn excite(&mut self, offset: Vector3<f32>) {
+        self.flight.excite(offset);
+    }
+
+    fn step(&mut self, tick: Tick, state: &State) -> MotorCommand {
+        self.flight.step(tick, state, &mut self.scratch)
+    }
+
+    fn reference(&self) -> &Reference {
+        self.flight.reference()
+    }
+
+    fn trips(&mut self) -> Trips {
+        self.flight.adapter().map(|adapter| adapter.trips()).unwrap_or_default()
+    }
+}

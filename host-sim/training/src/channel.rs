@@ -1,0 +1,145 @@
+//! Channels of logs: one reference, one measured value, for the diagnosis.
+//!
+//! *in* flight logs, or CSV files of any loop; *out* records; *never* a measured value that is older than stated; *source* Zhou 2017,
+//! Fig. 1: u and y of the baseline. Of a flight log the desired position is u: without an add-on it is the reference but for a dither,
+//! which the velocity reference does not share and which here counts as noise.
+
+use std::{fs::File, path::Path};
+
+use impromptu_diagnosis::{Record, RecordError};
+use impromptu_sim::flight_log::{FlightLog, LogError};
+
+/// A channel by name.
+#[derive(Clone, Debug)]
+pub struct Channel {
+    /// Name: an axis, or the column that was measured.
+    pub name: String,
+    /// Unit of its values.
+    pub unit: &'static str,
+    /// Record.
+    pub record: Record,
+}
+
+/// Why a file holds no channel.
+#[derive(Debug, thiserror::Error)]
+pub enum ChannelError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// A column is missing.
+    #[error(
+        "{file}: column `{column}` is missing (there are: {found}); name the columns with --columns TIME,REFERENCE,MEASURED, or see `host-sim diagnose --help`"
+    )]
+    Column {
+        /// The file.
+        file: String,
+        /// The column.
+        column: String,
+        /// The columns found.
+        found: String,
+    },
+    /// The columns are no record.
+    #[error("{file}: {source}")]
+    Record {
+        /// The file.
+        file: String,
+        /// Why.
+        source: RecordError,
+    },
+}
+
+/// Axes of a flight log.
+pub const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// An axis of flight logs as a record; `age_s` is the age of what was measured.
+///
+/// # Errors
+/// If a log is too short, or their rates differ.
+pub fn of_logs<'a>(logs: impl IntoIterator<Item = &'a FlightLog>, axis: usize, age_s: f64) -> Result<Record, RecordError> {
+    let records = logs.into_iter().map(|log| {
+        let desired: Vec<f64> = log.rows.iter().map(|row| row.desired.position[axis]).collect();
+        let measured: Vec<f64> = log.rows.iter().map(|row| row.measured_position[axis]).collect();
+        let time: Vec<f64> = (0..log.rows.len()).map(|row| row as f64 / log.rate_hz).collect();
+        fresh(&time, &desired, &measured, age_s)
+    });
+    Record::joined(records.collect::<Result<Vec<_>, _>>()?)
+}
+
+/// A record whose measured values are as old as stated, brought to the time at which they were true.
+fn fresh(time: &[f64], reference: &[f64], measured: &[f64], age_s: f64) -> Result<Record, RecordError> {
+    let record = Record::new(time, reference, measured)?;
+    if age_s <= 0.0 {
+        return Ok(record);
+    }
+    let ticks = age_s / record.period_s;
+    let (whole, share) = (ticks as usize, ticks.fract());
+    let later: Vec<f64> = measured.windows(2).skip(whole).map(|pair| pair[0] + share * (pair[1] - pair[0])).collect();
+    Record::new(&time[..later.len()], &reference[..later.len()], &later)
+}
+
+/// Channels of a CSV file: those of the columns asked for (time, reference, measured); or every axis of a flight log, of which the
+/// diagnosis needs `time_s`, `desired_{x,y,z}_m` and `measured_{x,y,z}_m`; or `time_s`, `reference` (or `desired`) and `measured`.
+///
+/// # Errors
+/// Names the file, the line and the column of what is wrong.
+pub fn read(path: &Path, columns: Option<&[String; 3]>, age_s: f64) -> Result<Vec<Channel>, ChannelError> {
+    let file = path.display().to_string();
+    let reader = File::open(path).map_err(|source| LogError::File { file: file.clone(), source })?;
+    let in_csv = |source| LogError::Csv { file: file.clone(), source };
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(reader);
+    let header = reader.headers().map_err(in_csv)?.clone();
+    let has = |column: &str| header.iter().any(|name| name == column);
+    let names = |time: &str, reference: &str, measured: &str| [time, reference, measured].map(str::to_owned);
+    let wanted: Vec<(String, &'static str, [String; 3])> = match columns {
+        Some(columns) => vec![(columns[2].clone(), "units", columns.clone())],
+        None => {
+            let axes =
+                AXES.iter().map(|axis| (axis, names("time_s", &format!("desired_{axis}_m"), &format!("measured_{axis}_m"))));
+            let flight: Vec<_> = axes
+                .filter(|(_, columns)| has(&columns[1]) && has(&columns[2]))
+                .map(|(axis, columns)| ((*axis).to_owned(), "m", columns))
+                .collect();
+            if flight.is_empty() {
+                let reference = if !has("reference") && has("desired") { "desired" } else { "reference" };
+                vec![("measured".to_owned(), "units", names("time_s", reference, "measured"))]
+            } else {
+                flight
+            }
+        }
+    };
+    let find = |column: &String| {
+        header.iter().position(|name| name == column).ok_or_else(|| ChannelError::Column {
+            file: file.clone(),
+            column: column.clone(),
+            found: header.iter().take(12).collect::<Vec<_>>().join(", ") + if header.len() > 12 { ", …" } else { "" },
+        })
+    };
+    let places = wanted
+        .iter()
+        .map(|(_, _, columns)| Ok([find(&columns[0])?, find(&columns[1])?, find(&columns[2])?]))
+        .collect::<Result<Vec<[usize; 3]>, ChannelError>>()?;
+    let mut values = vec![[const { Vec::<f64>::new() }; 3]; wanted.len()];
+    for record in reader.records() {
+        let record = record.map_err(in_csv)?;
+        for (places, values) in places.iter().zip(&mut values) {
+            for (&place, values) in places.iter().zip(values) {
+                let text = record.get(place).unwrap_or_default();
+                let value = text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| LogError::Cell {
+                    file: file.clone(),
+                    line: record.position().map_or(0, csv::Position::line),
+                    column: header.get(place).unwrap_or_default().into(),
+                    found: text.into(),
+                })?;
+                values.push(value);
+            }
+        }
+    }
+    let in_file = |source| ChannelError::Record { file: file.clone(), source };
+    wanted
+        .into_iter()
+        .zip(values)
+        .map(|((name, unit, _), [time, reference, measured])| {
+            Ok(Channel { name, unit, record: fresh(&time, &reference, &measured, age_s).map_err(in_file)? })
+        })
+        .collect()
+}

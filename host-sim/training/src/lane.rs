@@ -1,0 +1,394 @@
+//! Choice of the feedback lane: designs from dithered logs, judged in flight.
+//!
+//! A design is admissible if no validation flight, at nominal, with 10 and 20 ms more delay in the whole loop, and with the loop's gain
+//! times 0.7 and 1.3, is worse than the baseline's flight of the same trajectory, except where the network lane alone is worse too: for a
+//! vehicle that tumbles without the lane the lane is not to blame. Among the admissible ones the best score is taken: average
+//! and worst flight of each of these cases, the nominal one counting most: what a user gets also when the vehicle is not quite
+//! the one that was identified.
+
+use impromptu_firmware::{
+    adapter::Lanes,
+    model::{Margins, Model},
+};
+use impromptu_model_export::{
+    ExportError,
+    description::{AuthorityDescription, LaneAxisDescription, LaneDescription},
+};
+use impromptu_sim::{
+    flight_log::FlightLog,
+    flights::{FlightsError, Loop},
+    rollout::{Dither, RolloutError},
+    trajectory::Trajectory,
+};
+use rayon::prelude::*;
+
+use crate::{
+    feedback_design::{AxisLog, DesignRefusal, DesignSettings, IdentificationData, LaneDesign, design},
+    recipe::{LaneRecipe, Recipe},
+};
+
+/// Why a model is written without a feedback lane.
+#[derive(Debug, thiserror::Error)]
+pub enum LaneRefusal {
+    /// The identification or every design was refused.
+    #[error("{axis}: {reason}")]
+    Design {
+        /// Axis that was refused.
+        axis: &'static str,
+        /// Why.
+        reason: DesignRefusal,
+    },
+    /// No design passed the validation flights.
+    #[error("of {designs} designs none passed the validation flights; the best one's worst flight was {worst:.1} % ({case})")]
+    Flights {
+        /// Designs that were flown.
+        designs: usize,
+        /// Reduction of the worst flight of the best design, per cent.
+        worst: f64,
+        /// The case in which that was.
+        case: String,
+    },
+    /// Flights could not be flown.
+    #[error(transparent)]
+    Rollout(#[from] FlightsError),
+    /// A candidate could not be encoded.
+    #[error(transparent)]
+    Export(#[from] ExportError),
+}
+
+impl From<RolloutError> for LaneRefusal {
+    fn from(error: RolloutError) -> Self {
+        Self::Rollout(error.into())
+    }
+}
+
+/// The lane that was chosen.
+#[derive(Clone, Debug)]
+pub struct LaneChoice {
+    /// What is stored.
+    pub lane: LaneDescription,
+    /// The design in words.
+    pub design: String,
+    /// Score: weighted mean over the cases of 90 % of the (geometric) average and 10 % of the worst reduction, per cent.
+    pub score: f64,
+    /// Worst reduction over all validation flights, per cent.
+    pub worst: f64,
+}
+
+/// One design, ready to be flown.
+struct Candidate {
+    lane: LaneDescription,
+    design: String,
+}
+
+/// A way in which validation flights differ from the design.
+struct Case {
+    name: &'static str,
+    /// Share of the score; flights are mostly nominal.
+    weight: f64,
+    delay_s: f64,
+    loop_gain: f32,
+}
+
+const CASES: [Case; 5] = [
+    Case { name: "nominal", weight: 0.4, delay_s: 0.0, loop_gain: 1.0 },
+    Case { name: "+10 ms", weight: 0.125, delay_s: 0.01, loop_gain: 1.0 },
+    Case { name: "+20 ms", weight: 0.225, delay_s: 0.02, loop_gain: 1.0 },
+    Case { name: "loop gain 0.7", weight: 0.125, delay_s: 0.0, loop_gain: 0.7 },
+    Case { name: "loop gain 1.3", weight: 0.125, delay_s: 0.0, loop_gain: 1.3 },
+];
+
+/// Identification data of x and y pooled, and of z.
+pub(crate) fn identification(logs: &[FlightLog], lags: usize) -> Result<[IdentificationData; 2], LaneRefusal> {
+    let signals: Vec<[Vec<f64>; 5]> = logs
+        .iter()
+        .flat_map(|log| {
+            (0..3).map(|axis| {
+                let column =
+                    |value: &dyn Fn(&impromptu_sim::flight_log::LogRow) -> f64| log.rows.iter().map(value).collect::<Vec<f64>>();
+                [
+                    column(&|row| row.measured_position[axis]),
+                    column(&|row| row.measured_velocity[axis]),
+                    column(&|row| row.reference_position[axis]),
+                    column(&|row| row.reference_velocity[axis]),
+                    column(&|row| row.reference_position[axis] - row.desired.position[axis]),
+                ]
+            })
+        })
+        .collect();
+    let logs_of = |wanted: &dyn Fn(usize) -> bool| -> Vec<AxisLog<'_>> {
+        signals
+            .iter()
+            .enumerate()
+            .filter(|(index, _)| wanted(index % 3))
+            .map(|(_, [position, velocity, reference, reference_velocity, dither])| AxisLog {
+                measured_position: position,
+                measured_velocity: velocity,
+                reference_position: reference,
+                reference_velocity,
+                dither: Some(dither),
+            })
+            .collect()
+    };
+    let collect = |axis, logs: &[AxisLog<'_>]| {
+        IdentificationData::collect(logs, lags).map_err(|reason| LaneRefusal::Design { axis, reason })
+    };
+    Ok([collect("x and y", &logs_of(&|axis| axis < 2))?, collect("z", &logs_of(&|axis| axis == 2))?])
+}
+
+/// All designs of the recipe's grid that exist; the last refusal if none does.
+fn candidates(recipe: &LaneRecipe, logs: &[FlightLog]) -> Result<Vec<Candidate>, LaneRefusal> {
+    let data = identification(logs, recipe.design.margin_lags)?;
+    let mut grid = Vec::new();
+    for &effort in &recipe.efforts {
+        for &velocity_weight in &recipe.velocity_weights {
+            for &noise_factor in &recipe.noise_factors {
+                grid.push(DesignSettings { effort, velocity_weight, noise_factor, ..recipe.design.clone() });
+            }
+        }
+    }
+    let designs: Vec<Result<[LaneDesign; 2], LaneRefusal>> = grid
+        .par_iter()
+        .map(|settings| {
+            let make = |axis, data| design(data, settings).map_err(|reason| LaneRefusal::Design { axis, reason });
+            Ok([make("x and y", &data[0])?, make("z", &data[1])?])
+        })
+        .collect();
+    let mut refusal = None;
+    let mut candidates = Vec::new();
+    for (settings, designs) in grid.iter().zip(designs) {
+        let [horizontal, vertical] = match designs {
+            Ok(designs) => designs,
+            Err(reason) => {
+                refusal = Some(reason);
+                continue;
+            }
+        };
+        for (&fast_limit, &scale) in
+            recipe.fast_limits.iter().flat_map(|limit| recipe.authority_scales.iter().map(move |scale| (limit, scale)))
+        {
+            candidates.push(Candidate {
+                lane: describe(&[&horizontal, &horizontal, &vertical], fast_limit, scale, recipe),
+                design: format!(
+                    "effort {}, e_v {}, noise x{}, fast clamp {} m (half of it at {} m/s²)",
+                    settings.effort, settings.velocity_weight, settings.noise_factor, fast_limit, scale
+                ),
+            });
+        }
+    }
+    match refusal {
+        Some(reason) if candidates.is_empty() => Err(reason),
+        _ => Ok(candidates),
+    }
+}
+
+/// Lanes of all designs of the recipe's grid that exist, from dithered logs, not flown yet; each with its margins.
+///
+/// # Errors
+/// If there is none.
+pub fn lanes(recipe: &LaneRecipe, logs: &[FlightLog]) -> Result<Vec<LaneDescription>, LaneRefusal> {
+    Ok(candidates(recipe, logs)?.into_iter().map(|candidate| candidate.lane).collect())
+}
+
+/// A design for each axis as the firmware stores it: errors of position and velocity, output on the position reference.
+fn describe(designs: &[&LaneDesign; 3], fast_limit: f64, scale: f64, recipe: &LaneRecipe) -> LaneDescription {
+    let axes = designs
+        .iter()
+        .zip(0u8..)
+        .map(|(design, axis)| {
+            let stored: Vec<f32> = design.gain.stored_coefficients().iter().map(|value| *value as f32).collect();
+            let lags = design.gain.lags();
+            LaneAxisDescription {
+                output: axis,
+                errors: vec![(axis, axis), (axis + 3, axis + 3)],
+                error_coefficients: vec![stored[..lags].to_vec(), stored[lags..2 * lags].to_vec()],
+                output_coefficients: stored[2 * lags..].to_vec(),
+                integral: design.gain.integral_coefficient as f32,
+                fast_limit: fast_limit as f32,
+                integral_limit: recipe.integral_limit as f32,
+            }
+        })
+        .collect();
+    // Desired accelerations, whose effect on the loop outlasts them.
+    let authority = AuthorityDescription {
+        channels: vec![6, 7, 8],
+        scale: scale as f32,
+        error_scale: recipe.error_scale as f32,
+        decay: recipe.authority_decay as f32,
+    };
+    LaneDescription { axes, authority, margins: worst_margins(designs) }
+}
+
+/// The smallest margins over the axes; zero where the longer model is unstable.
+fn worst_margins(designs: &[&LaneDesign; 3]) -> Margins {
+    let mut worst = Margins { delay_ms: f32::MAX, gain: f32::MAX, modulus: f32::MAX };
+    for design in designs {
+        let found = design.assessment.margins.as_ref().map_or(Margins::default(), |margins| Margins {
+            delay_ms: margins.delay_milliseconds.map_or(f32::MAX, |value| value as f32),
+            gain: margins.gain_up.map_or(f32::MAX, |value| value as f32),
+            modulus: margins.modulus as f32,
+        });
+        worst.delay_ms = worst.delay_ms.min(found.delay_ms);
+        worst.gain = worst.gain.min(found.gain);
+        worst.modulus = worst.modulus.min(found.modulus);
+    }
+    worst
+}
+
+/// Collects dithered logs.
+///
+/// # Errors
+/// If they cannot be flown.
+pub fn dithered_logs(recipe: &LaneRecipe, plant: &Loop, seed: u64) -> Result<Vec<FlightLog>, FlightsError> {
+    let dither = Dither { amplitude: recipe.dither, hold_s: recipe.dither_hold_s };
+    plant.collect(&recipe.excitation.motions(seed), Some(dither), seed)
+}
+
+/// How one design flew.
+struct Score {
+    /// As [`LaneChoice::score`].
+    mean: f64,
+    worst: f64,
+    worst_case: &'static str,
+    /// Least gain of a nominal flight over the network lane alone, per cent of the baseline's error.
+    over_network: f64,
+}
+
+/// All designs of a recipe from dithered logs, and how each flew over the validation trajectories in every case.
+fn flown(
+    recipe: &LaneRecipe,
+    plant: &Loop,
+    logs: &[FlightLog],
+    validation: &[Trajectory],
+    seed: u64,
+    encode: &(dyn Fn(&LaneDescription) -> Result<Vec<u8>, ExportError> + Sync),
+) -> Result<(Vec<Candidate>, Vec<Score>), LaneRefusal> {
+    let candidates = candidates(recipe, logs)?;
+    let cases = &CASES;
+    // What a lane does by itself is judged, not what the guard makes of it.
+    let plant = &plant.unguarded();
+    let loops: Vec<Loop> = cases.iter().map(|case| plant.delayed(case.delay_s)).collect();
+    let baselines: Vec<Vec<f64>> =
+        loops.iter().map(|plant| plant.errors(validation, None, 1.0, seed)).collect::<Result<_, _>>()?;
+    let network_alone: Vec<Vec<f64>> = match candidates.first() {
+        Some(candidate) => {
+            let bytes = encode(&candidate.lane)?;
+            let model = Model::from_bytes(&bytes).map_err(ExportError::Refused)?;
+            let lanes = Lanes { network: true, feedback: false };
+            loops.iter().map(|plant| plant.errors(validation, Some((&model, lanes)), 1.0, seed)).collect::<Result<_, _>>()?
+        }
+        None => Vec::new(),
+    };
+    let scores = candidates
+        .par_iter()
+        .map(|candidate| {
+            let bytes = encode(&candidate.lane)?;
+            let model = Model::from_bytes(&bytes).map_err(ExportError::Refused)?;
+            let mut score = Score { mean: 0.0, worst: f64::INFINITY, worst_case: "", over_network: f64::INFINITY };
+            for (place, (((case, plant), baseline), alone)) in
+                cases.iter().zip(&loops).zip(&baselines).zip(&network_alone).enumerate()
+            {
+                let errors = plant.errors(validation, Some((&model, Lanes::BOTH)), case.loop_gain, seed)?;
+                let worst = worst_to_answer_for(baseline, alone, &errors);
+                // The geometric mean: halving a small error counts as much as halving a large one.
+                let logs = baseline.iter().zip(&errors).map(|(baseline, error)| (error / baseline).ln());
+                let mean = 100.0 * (1.0 - (logs.sum::<f64>() / baseline.len().max(1) as f64).exp());
+                score.mean += case.weight * (0.9 * mean + 0.1 * worst);
+                if worst < score.worst {
+                    (score.worst, score.worst_case) = (worst, case.name);
+                }
+                if place == 0 {
+                    let gains = baseline.iter().zip(alone).zip(&errors);
+                    let gains = gains.map(|((baseline, network), error)| 100.0 * (network - error) / baseline);
+                    score.over_network = gains.fold(f64::INFINITY, f64::min);
+                }
+            }
+            Ok(score)
+        })
+        .collect::<Result<_, LaneRefusal>>()?;
+    Ok((candidates, scores))
+}
+
+/// The worst reduction, per cent, among the flights in which the network lane alone is not worse than the baseline.
+fn worst_to_answer_for(baseline: &[f64], network_alone: &[f64], errors: &[f64]) -> f64 {
+    let flights = baseline.iter().zip(network_alone).zip(errors);
+    let answerable = flights.filter(|((baseline, alone), _)| alone <= baseline);
+    answerable.map(|((baseline, _), error)| 100.0 * (1.0 - error / baseline)).fold(100.0, f64::min)
+}
+
+/// A nominal flight may lose this much, per cent of the baseline's error, against the network lane alone; of what the worst one loses
+/// beyond it, a share is taken off the score: it is one flight of many.
+const LOSS_AGAINST_NETWORK: f64 = 1.0;
+const LOSS_SHARE: f64 = 0.2;
+
+/// Designs lanes from dithered `logs` and chooses one by flights over the `validation` trajectories. `encode` makes a
+/// model file with a lane; the network lane flies too.
+///
+/// # Errors
+/// With the reason why there is no lane.
+pub fn choose_lane(
+    recipe: &Recipe,
+    plant: &Loop,
+    logs: &[FlightLog],
+    validation: &[Trajectory],
+    seed: u64,
+    encode: &(dyn Fn(&LaneDescription) -> Result<Vec<u8>, ExportError> + Sync),
+) -> Result<LaneChoice, LaneRefusal> {
+    let (candidates, scores) = flown(&recipe.lane, plant, logs, validation, seed, encode)?;
+    let admissible = |score: &Score| score.worst >= 0.0;
+    if let Some(choice) = best(&candidates, &scores, &admissible) {
+        return Ok(choice);
+    }
+    let (worst, case) = scores
+        .iter()
+        .max_by(|a, b| a.worst.total_cmp(&b.worst))
+        .map_or((f64::NEG_INFINITY, "no design"), |score| (score.worst, score.worst_case));
+    Err(LaneRefusal::Flights { designs: candidates.len(), worst, case: case.into() })
+}
+
+/// The design with the best score, admissible or not: the feedback lane of the flatness comparison, for which the clamp
+/// that suits the network lane would be unfairly small.
+///
+/// # Errors
+/// If there is no design at all.
+pub fn strongest_lane(
+    recipe: &LaneRecipe,
+    plant: &Loop,
+    logs: &[FlightLog],
+    validation: &[Trajectory],
+    seed: u64,
+    encode: &(dyn Fn(&LaneDescription) -> Result<Vec<u8>, ExportError> + Sync),
+) -> Result<LaneChoice, LaneRefusal> {
+    let (candidates, scores) = flown(recipe, plant, logs, validation, seed, encode)?;
+    best(&candidates, &scores, &|_| true).ok_or(LaneRefusal::Flights {
+        designs: 0,
+        worst: f64::NEG_INFINITY,
+        case: "no design".into(),
+    })
+}
+
+fn best(candidates: &[Candidate], scores: &[Score], wanted: &dyn Fn(&Score) -> bool) -> Option<LaneChoice> {
+    let places = candidates.iter().zip(scores).filter(|(_, score)| wanted(score));
+    let merit = |score: &Score| score.mean + LOSS_SHARE * (score.over_network + LOSS_AGAINST_NETWORK).min(0.0);
+    places.max_by(|(_, a), (_, b)| merit(a).total_cmp(&merit(b))).map(|(candidate, score)| LaneChoice {
+        lane: candidate.lane.clone(),
+        design: candidate.design.clone(),
+        score: score.mean,
+        worst: score.worst,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lane_answers_for_the_flights_that_the_network_alone_can_fly() {
+        let baseline = [0.1, 0.1, 0.1];
+        assert_eq!(worst_to_answer_for(&baseline, &[0.05, 0.05, 0.05], &[0.01, 0.2, 0.02]), -100.0);
+        assert_eq!(worst_to_answer_for(&baseline, &[0.05, 2.0, 0.05], &[0.01, 3.0, 0.05]), 50.0);
+        assert_eq!(worst_to_answer_for(&baseline, &[2.0; 3], &[3.0; 3]), 100.0);
+        // A tumble that only the lane brings about.
+        assert!(worst_to_answer_for(&baseline, &[0.05; 3], &[0.01, f64::INFINITY, 0.01]) < 0.0);
+    }
+}

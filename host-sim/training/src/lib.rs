@@ -1,0 +1,52 @@
+//! From flight logs to models: what `impromptu-sim` has flown, or somebody's own vehicle, becomes the file that the firmware flies.
+//!
+//! ```text
+//! training flights ──► logs ──► sound ones ──► examples ──► ridge, networks ──► candidates ──► flights choose ──► model files
+//!                        └────► gates (does it make sense at all?)                                  ▲
+//! dithered flights ──► identification ──► designs of the feedback lane ──► flights choose ──────────┤
+//!                                 └──────► response for the guard's monitor ────────────────────────┘
+//! ```
+//!
+//! *in* a [`Recipe`] and a loop, or logs; *out* models; *never* a choice made on the test flights; *source* Zhou 2017, sections III and V.
+//!
+//! At the bottom are methods that know no recipe: supervised training from rows, identification and design of a feedback lane from signals,
+//! channels for the diagnosis. Above them is the recipe, which decides how a model comes about, and the single steps: leave out flights
+//! that broke down, learn, describe, choose a lane, measure what the monitor needs. [`build()`] does them all.
+//!
+//! | layer | modules | what they hold |
+//! |---|---|---|
+//! | 1 | `supervised`, `feedback_design`, `channel`, `breakdown`, `observer` | rows to networks; identification and design of the lane; channels of logs; flights that teach nothing; who watches |
+//! | 2 | `examples`, `gates`, `recipe` | rows of features from logs; the diagnosis before a training; everything that decides, as data |
+//! | 3 | `learn` | logs to networks |
+//! | 4 | `error`, `files`, `models` | why there are no models; files written whole; descriptions and model files |
+//! | 5 | `lane` | the feedback lane, chosen in flight |
+//! | 6 | `monitor` | what the guard is told of the loop |
+//! | 7 | `build` | from a loop to its models |
+
+pub mod breakdown;
+pub mod build;
+pub mod channel;
+pub mod error;
+pub mod examples;
+pub mod feedback_design;
+pub mod files;
+pub mod gates;
+pub mod lane;
+pub mod learn;
+pub mod models;
+pub mod monitor;
+pub mod observer;
+pub mod recipe;
+pub mod supervised;
+
+pub use breakdown::{Breakdown, largest_sound_error};
+pub use build::{Built, Purpose, best_in_flight, build, derived, smoothing, training_logs, validation_strokes};
+pub use error::BuildError;
+pub use files::{write_log, write_model_files};
+pub use gates::{AxisGates, check_gates};
+pub use lane::{LaneChoice, LaneRefusal, choose_lane, dithered_logs, lanes, strongest_lane};
+pub use learn::{Candidates, Judge, LearnError, Learned, Rows, learn};
+pub use models::{FromFlights, ModelSet, describe, feedforward};
+pub use monitor::{monitor, promise};
+pub use observer::Observer;
+pub use recipe::{Excitation, LaneRecipe, Recipe, Signal};

@@ -1,0 +1,157 @@
+//! Model files of an experiment.
+
+use impromptu_firmware::{
+    features::{Feature, Relative, Source},
+    model::{Interpolation, Output},
+};
+use impromptu_flight::{
+    flight::Settings,
+    quadrotor::{self, REFERENCE},
+};
+use impromptu_model_export::{
+    Description, ExportError, FloatNetwork, Precision,
+    description::{LaneDescription, MonitorDescription, Provenance, Signals, Timing},
+    encode,
+};
+use impromptu_sim::flights::Loop;
+
+use crate::{
+    learn::{Learned, Rows},
+    recipe::Recipe,
+};
+
+/// The models that an experiment compares, as the bytes of model files.
+#[derive(Clone, Debug)]
+pub struct ModelSet {
+    /// Flatness feed-forward.
+    pub feedforward: Vec<u8>,
+    /// Ridge regression.
+    pub ridge: Vec<u8>,
+    /// Network, f32.
+    pub float: Vec<u8>,
+    /// Network, int8.
+    pub int8: Vec<u8>,
+    /// What the int8 file says of itself.
+    pub description: Description,
+}
+
+/// What a model has from dithered logs and validation flights.
+#[derive(Clone, Debug, Default)]
+pub struct FromFlights {
+    /// Feedback lane.
+    pub lane: Option<LaneDescription>,
+    /// What the guard judges the lanes by.
+    pub monitor: Option<MonitorDescription>,
+}
+
+/// Limits above the largest correction in training.
+const LIMIT_FACTOR: f32 = 1.5;
+/// A correction may cross its whole range in this many reference ticks.
+const SLEW_TICKS: f32 = 5.0;
+
+impl ModelSet {
+    /// Encodes all models of a loop, each with the feedback lane and the monitor if there are any; the feed-forward has its own.
+    ///
+    /// # Errors
+    /// If a model cannot be encoded.
+    pub fn new(
+        recipe: &Recipe,
+        plant: &Loop,
+        learned: &Learned,
+        own: &FromFlights,
+        of_feedforward: &FromFlights,
+        remarks: &str,
+        seed: u64,
+    ) -> Result<Self, ExportError> {
+        let describe = |name: &str, from: &FromFlights| {
+            let description = describe(recipe, plant, &learned.rows, from.lane.as_ref(), name, remarks, seed);
+            Description { monitor: from.monitor.clone(), ..description }
+        };
+        let feedforward = feedforward(&plant.settings, describe("feedforward", of_feedforward))?;
+        let make = |name: &str, network: &FloatNetwork, precision| {
+            encode(&describe(name, own), Some(network), precision, &learned.rows.calibration)
+        };
+        Ok(Self {
+            feedforward,
+            ridge: make("ridge", &learned.ridge, Precision::Float)?,
+            float: make("net_f32", &learned.network, Precision::Float)?,
+            int8: make("net_int8", &learned.quantised, Precision::Int8)?,
+            description: describe("net_int8", own),
+        })
+    }
+}
+
+/// Largest correction and slew of each reference channel.
+fn outputs(rows: &Rows, lane: Option<&LaneDescription>) -> Vec<Output> {
+    let feedback =
+        lane.map_or(0.0, |lane| lane.axes.iter().map(|axis| axis.fast_limit + axis.integral_limit).fold(0.0, f32::max));
+    (0..REFERENCE)
+        .map(|channel| {
+            let limit = LIMIT_FACTOR * rows.label_range[channel] + if channel < 3 { feedback } else { 0.0 };
+            Output { channel: channel as u8, limit, slew: limit / SLEW_TICKS }
+        })
+        .collect()
+}
+
+/// Description of a model of a loop, without a monitor.
+pub fn describe(
+    recipe: &Recipe,
+    plant: &Loop,
+    rows: &Rows,
+    lane: Option<&LaneDescription>,
+    name: &str,
+    remarks: &str,
+    seed: u64,
+) -> Description {
+    Description {
+        name: format!("{}-{}-{}-{name}", plant.vehicle.name, plant.gains, plant.condition.name),
+        provenance: Provenance {
+            vehicle: plant.vehicle.name.clone(),
+            gains: plant.gains.clone(),
+            condition: plant.condition.name.clone(),
+            software: format!("host-sim {}", env!("CARGO_PKG_VERSION")),
+            seed,
+            data_crc: rows.data_crc,
+            remarks: remarks.into(),
+        },
+        signals: Signals::from(&quadrotor::signals()),
+        timing: Timing {
+            reference_rate_hz: plant.rate_hz() as f32,
+            divisor: recipe.divisor,
+            interpolation: recipe.interpolation,
+            measurement_delay_s: plant.condition.measurement_delay_s as f32,
+            fade_s: recipe.fade_s as f32,
+        },
+        features: recipe.features(),
+        outputs: outputs(rows, lane),
+        envelope: rows.envelope.clone(),
+        feedback_lane: lane.cloned(),
+        monitor: None,
+    }
+}
+
+/// Differential-flatness feed-forward through the reference, p_r = p_d + a_d / kp, as a linear model at the reference's own rate.
+///
+/// # Errors
+/// If it cannot be encoded.
+pub fn feedforward(settings: &Settings, description: Description) -> Result<Vec<u8>, ExportError> {
+    let features: Vec<Feature> =
+        (6..9).map(|channel| Feature { source: Source::Desired, channel, offset: 0, relative: Relative::Nothing }).collect();
+    let mut skip = vec![0.0; REFERENCE * 3];
+    for (axis, kp) in settings.position.kp.iter().enumerate() {
+        skip[axis * 3 + axis] = 1.0 / kp;
+    }
+    let network = FloatNetwork {
+        input_mean: vec![0.0; 3],
+        input_scale: vec![1.0; 3],
+        layers: Vec::new(),
+        skip: Some(skip),
+        output_mean: vec![0.0; REFERENCE],
+        output_scale: vec![1.0; REFERENCE],
+        notes: Default::default(),
+    };
+    // Evaluated a tick ahead, so that the inference's time does not delay it.
+    let timing = Timing { divisor: 1, interpolation: Interpolation::Linear, ..description.timing };
+    let description = Description { timing, envelope: vec![(-20.0, 20.0); 3], features, ..description };
+    encode(&description, Some(&network), Precision::Float, &[vec![1.0, -2.0, 0.5]])
+}
