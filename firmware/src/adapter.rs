@@ -5,30 +5,29 @@
 //! user or by the [guard](crate::guard); *source* Zhou 2017, Fig. 1. What differs: the correction is ramped between sub-rate ticks, and a feedback lane adds to it.
 
 mod correction;
+mod fade;
 mod feedback;
 mod inference;
-mod lanes;
 mod ramp;
 mod signals;
 
 use crate::{
     features,
+    format::{Card, Channels, EndRule, Interpolation, MAX_FEATURES, MAX_OUTPUTS, Refusal},
     guard::{Findings, Guard, GuardSettings, Trips, finite},
     math::finite_or_zero,
-    model::{Card, Channels, Interpolation, MAX_FEATURES, MAX_OUTPUTS, Model, Refusal},
+    model::Model,
     network::Scratch,
-    preview::{EndRule, Preview},
+    preview::Preview,
 };
 use correction::{Correction, Wanted};
+use fade::Fade;
 use feedback::Feedback;
 pub use inference::{Inference, Job};
-use lanes::Fade;
-pub use lanes::Lanes;
 use ramp::Ramp;
 use signals::{History, View, base_channels, same_signals};
 
-/// Sub-rate ticks of measured and reference history that features can read.
-pub const HISTORY: usize = 16;
+pub use crate::{format::HISTORY, lanes::Lanes};
 
 /// Adapter for a loop with `D` desired, `M` measured and `R` reference channels.
 ///
@@ -207,7 +206,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     }
 
     /// One reference tick with all that belongs to it: the reference that the loop shall track. `preview` should reach
-    /// [`crate::model::Card::preview_span`]'s future ahead; what is missing is taken as the trajectory's end. The scratch needs
+    /// [`crate::format::Card::preview_span`]'s future ahead; what is missing is taken as the trajectory's end. The scratch needs
     /// [`crate::network::Network::scratch_words`].
     pub fn step<const N: usize, const S: usize>(
         &mut self,

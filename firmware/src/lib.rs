@@ -15,6 +15,11 @@
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 pub mod math;
+
+pub mod lanes;
+
+pub mod format;
+
 pub mod preview;
 
 pub mod features;

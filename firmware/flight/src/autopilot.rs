@@ -22,11 +22,12 @@ use impromptu_firmware::{
 use nalgebra::{Quaternion, UnitQuaternion, Vector4};
 
 use crate::{
-    flight::{Flight, PREVIEW, Rates, Settings},
+    flight::{Flight, PREVIEW},
     link::{
         Command, Order, Outcome, Reason, Received,
         message::{FrameReport, Identity, LaneReport, Motors, Telemetry, TimedSetpoint},
     },
+    settings::{Rates, Settings},
     types::{MotorCommand, Reference, Setpoint, State, Tick},
 };
 

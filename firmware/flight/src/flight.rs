@@ -12,55 +12,20 @@ use impromptu_firmware::{
     preview::{EndRule, Preview},
 };
 use nalgebra::{Matrix3, Vector3};
-use serde::{Deserialize, Serialize};
 
 use crate::{
-    control::{Airframe, AttitudeGains, AttitudeLoop, Mixer, PositionGains, PositionLoop, ThrustVector},
+    control::{AttitudeLoop, Mixer, PositionLoop, ThrustVector},
     quadrotor::{self, DESIRED, MEASURED, REFERENCE},
     types::{MotorCommand, Reference, Setpoint, State, Tick},
 };
+
+pub use crate::settings::{Rates, Settings};
 
 /// Samples of the desired trajectory that the flight stack keeps: 1.92 s at 100 Hz.
 pub const PREVIEW: usize = 192;
 
 /// Commands of the position loop that can be on their way to the attitude loop: 160 ms at 100 Hz.
 const COMMANDS: usize = 16;
-
-/// Rates of the loops.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Rates {
-    /// Control ticks (attitude loop) a second.
-    pub control_hz: f32,
-    /// Control ticks in a tick of the position loop, which is the reference's tick.
-    pub position_divisor: u32,
-}
-
-impl Default for Rates {
-    /// 500 Hz and 100 Hz, as the Crazyflie's firmware runs its attitude and position loops.
-    fn default() -> Self {
-        Self { control_hz: 500.0, position_divisor: 5 }
-    }
-}
-
-impl Rates {
-    /// Rate of the position loop and so of the reference, Hz.
-    pub fn reference_hz(&self) -> f32 {
-        self.control_hz / self.position_divisor.max(1) as f32
-    }
-}
-
-/// Settings of the flight stack.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Settings {
-    /// Vehicle constants.
-    pub airframe: Airframe,
-    /// Position loop.
-    pub position: PositionGains,
-    /// Attitude loop.
-    pub attitude: AttitudeGains,
-    /// Rates.
-    pub rates: Rates,
-}
 
 /// The adapter of the flight stack.
 pub type QuadrotorAdapter<'m> = Adapter<'m, DESIRED, MEASURED, REFERENCE>;

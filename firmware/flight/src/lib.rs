@@ -10,6 +10,8 @@ pub mod types;
 
 pub mod control;
 
+pub mod settings;
+
 pub mod quadrotor;
 
 pub mod flight;

@@ -4,9 +4,9 @@
 //! limit, nor more than its slew from one tick to the next; *source* ours.
 
 use crate::{
+    format::{Card, MAX_AXES, MAX_OUTPUTS},
     guard::Shares,
     math::clamp,
-    model::{Card, MAX_AXES, MAX_OUTPUTS},
 };
 
 /// What the lanes want of a reference tick.

@@ -10,8 +10,8 @@
 
 use super::{GuardSettings, Monitor, watch::leak};
 use crate::{
+    format::{Floats, MAX_AXES, MAX_INPUTS, MAX_OUTPUTS, MAX_TAPS},
     math::{clamp, finite_or_zero},
-    model::{Floats, MAX_AXES, MAX_INPUTS, MAX_OUTPUTS, MAX_TAPS},
 };
 
 /// Bound of the errors that are believed.
