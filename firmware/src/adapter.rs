@@ -57,8 +57,8 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
 
 impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     /// An adapter without a model, which corrects nothing: all zeros. It is 6 KB large, so a microcontroller has it in a static, or in
-    /// something that is one, and [ties](Adapter::tie) it there.
-    pub const fn parked() -> Self {
+    /// something that is one, and [loads](Adapter::load) it there.
+    pub const fn empty() -> Self {
         Self {
             model: None,
             guard: Guard::VACANT,
@@ -84,8 +84,8 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     pub fn new<'t>(model: &'m Model<'m>, table: impl Into<Channels<'t>>, rate_hz: f32, capacity: usize) -> Result<Self, Refusal> {
         let table = table.into();
         Self::check(model, &table, rate_hz, capacity)?;
-        let mut adapter = Self::parked();
-        adapter.tie(model, &table);
+        let mut adapter = Self::empty();
+        adapter.load(model, &table);
         Ok(adapter)
     }
 
@@ -109,11 +109,17 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     }
 
     /// Makes this, in its place, what [`Adapter::new`] makes of a model that passes [`Adapter::check`]. With another one it is as safe, and of no use.
-    pub fn tie(&mut self, model: &'m Model<'m>, table: &Channels<'_>) {
+    pub fn load(&mut self, model: &'m Model<'m>, table: &Channels<'_>) {
         self.model = Some(model);
         self.guard.tie(GuardSettings::default(), model.card().timing.reference_rate_hz);
         self.base = base_channels(table);
         (self.deferred, self.loop_gain) = (false, 1.0);
+        self.restart();
+    }
+
+    /// Forgets the model too: no correction, and no job any more.
+    pub fn unload(&mut self) {
+        self.model = None;
         self.restart();
     }
 

@@ -33,6 +33,7 @@ pub type QuadrotorAdapter<'m> = Adapter<'m, DESIRED, MEASURED, REFERENCE>;
 /// The loops of a vehicle.
 #[derive(Debug)]
 struct Loops {
+    rates: Rates,
     position_divisor: NonZeroU32,
     position: PositionLoop,
     attitude: AttitudeLoop,
@@ -43,6 +44,7 @@ impl Loops {
     /// `None` if the airframe cannot be mixed.
     fn new(settings: &Settings) -> Option<Self> {
         Some(Self {
+            rates: settings.rates,
             position_divisor: NonZeroU32::new(settings.rates.position_divisor).unwrap_or(NonZeroU32::MIN),
             position: PositionLoop::new(settings.position, settings.airframe.mass, settings.rates.reference_hz()),
             attitude: AttitudeLoop::new(settings.attitude, settings.airframe.inertia),
@@ -51,14 +53,39 @@ impl Loops {
     }
 }
 
-/// The baseline loop with, if a model is given, the add-on before it.
+/// What is configured and attached. The adapter has a model exactly if this is [`Stage::Adapted`], and a model that fits these loops.
+#[derive(Debug)]
+enum Stage {
+    /// Nothing is known of a vehicle: its motors are off.
+    Empty,
+    /// The loops alone.
+    Baseline(Loops),
+    /// The loops with the add-on before them.
+    Adapted(Loops),
+}
+
+impl Stage {
+    fn loops(&self) -> Option<&Loops> {
+        match self {
+            Self::Empty => None,
+            Self::Baseline(loops) | Self::Adapted(loops) => Some(loops),
+        }
+    }
+
+    fn loops_mut(&mut self) -> Option<&mut Loops> {
+        match self {
+            Self::Empty => None,
+            Self::Baseline(loops) | Self::Adapted(loops) => Some(loops),
+        }
+    }
+}
+
+/// The baseline loop with, if a model is attached, the add-on before it.
 #[derive(Debug)]
 pub struct Flight<'m> {
-    loops: Option<Loops>,
+    stage: Stage,
     preview: Preview<DESIRED, PREVIEW>,
     adapter: QuadrotorAdapter<'m>,
-    /// Whether its model is for these settings.
-    fits: bool,
     wanted: ThrustVector,
     reference: Reference,
     excitation: Vector3<f32>,
@@ -67,13 +94,13 @@ pub struct Flight<'m> {
 }
 
 impl<'m> Flight<'m> {
-    /// A flight stack that knows no vehicle: its motors are off. It is 12 KB large, so a microcontroller has it in a static.
-    pub const fn parked() -> Self {
+    /// A flight stack that knows no vehicle: its motors are off. It is 12 KB large and all zeros, so a microcontroller has it in a static
+    /// and [configures](Flight::configure) it there.
+    pub const fn empty() -> Self {
         Self {
-            loops: None,
+            stage: Stage::Empty,
             preview: Preview::new([EndRule::Hold; DESIRED], 0),
-            adapter: QuadrotorAdapter::parked(),
-            fits: false,
+            adapter: QuadrotorAdapter::empty(),
             wanted: ThrustVector {
                 force: Vector3::new(0.0, 0.0, 0.0),
                 attitude: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
@@ -87,63 +114,64 @@ impl<'m> Flight<'m> {
 
     /// A flight stack on the ground; `None` if the airframe cannot be mixed. The first setpoint is that of reference tick 0.
     pub fn new(settings: &Settings) -> Option<Self> {
-        let mut flight = Self::parked();
+        let mut flight = Self::empty();
         flight.configure(settings).then_some(flight)
     }
 
     /// Back on the ground with these settings; `false`, and nothing changes, if the airframe cannot be mixed. An add-on stays, as it was when
-    /// it was attached but with its lanes off, if its model is for these settings.
+    /// it was attached but with its lanes off, if its model is for these settings; else it is detached.
     pub fn configure(&mut self, settings: &Settings) -> bool {
         let Some(loops) = Loops::new(settings) else { return false };
-        self.loops = Some(loops);
-        self.rest();
-        self.adapter.restart();
-        self.fits = self.adapter.model().is_some_and(|model| Self::accepts(model, &settings.rates).is_ok());
+        if self.adapter.model().is_some_and(|model| Self::accepts(model, &settings.rates).is_ok()) {
+            self.stage = Stage::Adapted(loops);
+            self.adapter.restart();
+        } else {
+            self.stage = Stage::Baseline(loops);
+            self.adapter.unload();
+        }
+        self.reset();
         true
     }
 
     /// Back on the ground: the next setpoint is that of reference tick 0, and nothing is left of the last flight but the lanes that are
     /// wanted and the counts.
-    pub fn land(&mut self) {
-        if let Some(loops) = &mut self.loops {
+    pub fn reset(&mut self) {
+        if let Some(loops) = self.stage.loops_mut() {
             loops.position.reset();
         }
-        self.rest();
-    }
-
-    /// Nothing is left of a flight but the integral of the position loop.
-    fn rest(&mut self) {
         self.preview.restart(quadrotor::END_RULES, 0);
         self.adapter.reset();
         (self.wanted, self.reference, self.excitation) = (ThrustVector::NONE, Reference::ORIGIN, Vector3::zeros());
         self.on_the_way.clear();
     }
 
-    /// Puts an add-on before the loop, with the lanes given.
+    /// Puts an add-on before the configured loops, with the lanes given, in the place of the one that was there.
     ///
     /// # Errors
-    /// If the model is for other signals, another rate, or a longer preview.
-    pub fn attach(&mut self, model: &'m Model<'m>, settings: &Settings, lanes: Lanes) -> Result<(), Refusal> {
-        self.engage(model, &settings.rates, lanes)
-    }
-
-    /// [`Flight::attach`], for which these settings are enough.
-    pub(crate) fn engage(&mut self, model: &'m Model<'m>, rates: &Rates, lanes: Lanes) -> Result<(), Refusal> {
-        Self::accepts(model, rates)?;
-        self.hold(model);
+    /// If the model is for other signals, another rate, or a longer preview; what was attached then stays. A flight stack without settings
+    /// has a rate of 0.
+    pub fn attach(&mut self, model: &'m Model<'m>, lanes: Lanes) -> Result<(), Refusal> {
+        Self::accepts(model, &self.stage.loops().map_or(Rates::NONE, |loops| loops.rates))?;
+        self.adapter.load(model, &quadrotor::signals());
+        self.adapter.defer();
         self.adapter.switch(lanes);
-        self.fits = true;
+        self.stage = match core::mem::replace(&mut self.stage, Stage::Empty) {
+            Stage::Empty => Stage::Empty,
+            Stage::Baseline(loops) | Stage::Adapted(loops) => Stage::Adapted(loops),
+        };
         Ok(())
     }
 
-    /// Has a model ready for settings which it is for ([`Flight::configure`]).
-    pub(crate) fn hold(&mut self, model: &'m Model<'m>) {
-        self.adapter.tie(model, &quadrotor::signals());
-        self.adapter.defer();
-        self.fits = false;
+    /// Takes the add-on away: the loops fly alone.
+    pub fn detach(&mut self) {
+        self.adapter.unload();
+        self.stage = match core::mem::replace(&mut self.stage, Stage::Empty) {
+            Stage::Empty => Stage::Empty,
+            Stage::Baseline(loops) | Stage::Adapted(loops) => Stage::Baseline(loops),
+        };
     }
 
-    /// Whether [`Flight::attach`] takes a model.
+    /// Whether [`Flight::attach`] takes a model, once configured with these rates.
     ///
     /// # Errors
     /// As [`Flight::attach`].
@@ -154,7 +182,10 @@ impl<'m> Flight<'m> {
 
     /// The add-on, if there is one.
     pub fn adapter(&mut self) -> Option<&mut QuadrotorAdapter<'m>> {
-        self.fits.then_some(&mut self.adapter)
+        match self.stage {
+            Stage::Adapted(_) => Some(&mut self.adapter),
+            Stage::Empty | Stage::Baseline(_) => None,
+        }
     }
 
     /// Appends the desired state of the next reference tick.
@@ -173,13 +204,13 @@ impl<'m> Flight<'m> {
     }
 
     /// Forgets the desired trajectory: the next setpoint is that of this reference tick.
-    pub fn restart_setpoints(&mut self, tick: i32) {
+    pub fn clear_setpoints(&mut self, tick: i32) {
         self.preview.clear(tick);
     }
 
     /// Reference tick of a control tick.
     pub fn reference_tick(&self, tick: Tick) -> i32 {
-        let divisor = self.loops.as_ref().map_or(NonZeroU32::MIN, |loops| loops.position_divisor);
+        let divisor = self.stage.loops().map_or(NonZeroU32::MIN, |loops| loops.position_divisor);
         (tick.0 / divisor) as i32
     }
 
@@ -223,11 +254,14 @@ impl<'m> Flight<'m> {
     /// [`Flight::control`] that puts the job, if there is one, where the caller has room for it: `true`.
     pub fn control_into(&mut self, tick: Tick, state: &State, job: &mut Job) -> (MotorCommand, bool) {
         let mut released = false;
-        let Some(loops) = &mut self.loops else { return (MotorCommand::OFF, released) };
+        let (loops, adapter) = match &mut self.stage {
+            Stage::Empty => return (MotorCommand::OFF, released),
+            Stage::Baseline(loops) => (loops, None),
+            Stage::Adapted(loops) => (loops, Some(&mut self.adapter)),
+        };
         if tick.0.is_multiple_of(loops.position_divisor.get()) {
             let reference_tick = (tick.0 / loops.position_divisor) as i32;
-            (self.reference, released) =
-                adapted(&self.preview, self.fits.then_some(&mut self.adapter), reference_tick, state, job);
+            (self.reference, released) = adapted(&self.preview, adapter, reference_tick, state, job);
             if self.excitation != Vector3::zeros() {
                 self.reference.position += self.excitation;
             }

@@ -24,6 +24,9 @@ impl Default for Rates {
 }
 
 impl Rates {
+    /// Of no loop: the reference's rate is 0.
+    pub(crate) const NONE: Self = Self { control_hz: 0.0, position_divisor: 1 };
+
     /// Rate of the position loop and so of the reference, Hz.
     pub fn reference_hz(&self) -> f32 {
         self.control_hz / self.position_divisor.max(1) as f32

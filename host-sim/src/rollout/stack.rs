@@ -70,7 +70,7 @@ impl<'a> Software<'a> {
     ) -> Result<Self, RolloutError> {
         let mut flight = Flight::new(settings).ok_or_else(|| RolloutError::Airframe(vehicle.name.clone()))?;
         if let Some((model, lanes)) = plan.model {
-            flight.attach(model, settings, lanes)?;
+            flight.attach(model, lanes)?;
             if let Some(adapter) = flight.adapter() {
                 adapter.set_loop_gain(plan.loop_gain);
                 adapter.set_guard(plan.guard);
