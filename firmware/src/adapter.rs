@@ -13,7 +13,7 @@ mod signals;
 
 use crate::{
     features,
-    format::{Card, Channels, EndRule, Interpolation, MAX_FEATURES, MAX_OUTPUTS, Refusal},
+    format::{Card, Channels, EndRule, Interpolation, MAX_AXES, MAX_FEATURES, MAX_OUTPUTS, Refusal},
     guard::{Findings, Guard, GuardSettings, Trips, finite},
     math::finite_or_zero,
     model::Model,
@@ -52,7 +52,6 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
     network_weight: f32,
     feedback_weight: f32,
     correction: Correction,
-    loop_gain: f32,
 }
 
 impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
@@ -72,7 +71,6 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             network_weight: 0.0,
             feedback_weight: 0.0,
             correction: Correction::NONE,
-            loop_gain: 0.0,
         }
     }
 
@@ -113,7 +111,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.model = Some(model);
         self.guard.tie(GuardSettings::default(), model.card().timing.reference_rate_hz);
         self.base = base_channels(table);
-        (self.deferred, self.loop_gain) = (false, 1.0);
+        self.deferred = false;
         self.restart();
     }
 
@@ -178,11 +176,6 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     /// Tells how many reference ticks ago the newest measurement arrived; 0 from the start.
     pub fn set_age(&mut self, ticks: u16) {
         self.guard.set_age(ticks);
-    }
-
-    /// Multiplies what the loop receives of the feedback lane, unknown to the lane: the loop gain of a robustness test. 1 in flight.
-    pub fn set_loop_gain(&mut self, gain: f32) {
-        self.loop_gain = gain;
     }
 
     /// Correction of each output of the model in the last tick.
@@ -283,6 +276,19 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
 
     /// Second part of a reference tick: the reference that the loop shall track.
     pub fn finish<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M]) -> [f32; R] {
+        self.finish_through(tick, preview, measured, |_| ())
+    }
+
+    /// [`Adapter::finish`] in which what the feedback lane asks for on each axis, in the output's unit, goes through `path` on its way to the
+    /// bounds, unknown to the lane: in flight the identity, in a simulator what a robustness study asks (another loop gain).
+    #[inline]
+    pub fn finish_through<const N: usize>(
+        &mut self,
+        tick: i32,
+        preview: &Preview<D, N>,
+        measured: &[f32; M],
+        path: impl FnOnce(&mut [f32; MAX_AXES]),
+    ) -> [f32; R] {
         let desired = preview.sample(tick);
         let mut reference = base(&self.base, &desired);
         let Some(model) = self.model else { return reference };
@@ -309,11 +315,13 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             feedback: self.feedback.step(model, tick, preview, &errors, engaged),
             network_weight: self.network_weight,
             feedback_weight: self.feedback_weight,
-            loop_gain: self.loop_gain,
         };
         let acting = self.correction.left() || self.network_weight > 0.0 || self.feedback_weight > 0.0;
-        let applied =
-            if acting { self.correction.apply(card, &wanted, &mut reference) } else { self.correction.clear(card, &wanted) };
+        let applied = if acting {
+            self.correction.apply(card, &wanted, path, &mut reference)
+        } else {
+            self.correction.clear(card, &wanted)
+        };
         self.feedback.applied(model, &applied.feedback);
         if acting || self.lanes != Lanes::NONE {
             guard.excess(applied.excess);

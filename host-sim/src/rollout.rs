@@ -3,6 +3,7 @@
 //! *in* [`FlightPlan`]s; *out* a [`FlightRecord`] each; *never* a result that depends on the order of the plans, on the other flights
 //! or on the number of threads; *source* Zhou 2017, Fig. 1; rates of `impromptu_flight::flight::Rates`.
 
+mod faults;
 mod pilot;
 mod stack;
 
@@ -27,6 +28,7 @@ use crate::{
     trajectory::{Sample, Trajectory},
     weather::Weather,
 };
+pub use faults::FaultyFlight;
 use pilot::Pilot;
 pub use stack::FlightStack;
 use stack::Software;

@@ -7,7 +7,7 @@ use core::num::NonZeroU32;
 
 use impromptu_firmware::{
     adapter::{Adapter, Inference, Job, Lanes},
-    model::{Model, Refusal},
+    model::{MAX_AXES, Model, Refusal},
     network::Scratch,
     preview::{EndRule, Preview},
 };
@@ -23,9 +23,6 @@ pub use crate::settings::{Rates, Settings};
 
 /// Samples of the desired trajectory that the flight stack keeps: 1.92 s at 100 Hz.
 pub const PREVIEW: usize = 192;
-
-/// Commands of the position loop that can be on their way to the attitude loop: 160 ms at 100 Hz.
-const COMMANDS: usize = 16;
 
 /// The adapter of the flight stack.
 pub type QuadrotorAdapter<'m> = Adapter<'m, DESIRED, MEASURED, REFERENCE>;
@@ -89,8 +86,6 @@ pub struct Flight<'m> {
     wanted: ThrustVector,
     reference: Reference,
     excitation: Vector3<f32>,
-    command_delay: u32,
-    on_the_way: heapless::Deque<(u32, ThrustVector), COMMANDS>,
 }
 
 impl<'m> Flight<'m> {
@@ -107,8 +102,6 @@ impl<'m> Flight<'m> {
             },
             reference: Reference::ORIGIN,
             excitation: Vector3::new(0.0, 0.0, 0.0),
-            command_delay: 0,
-            on_the_way: heapless::Deque::new(),
         }
     }
 
@@ -142,7 +135,6 @@ impl<'m> Flight<'m> {
         self.preview.restart(quadrotor::END_RULES, 0);
         self.adapter.reset();
         (self.wanted, self.reference, self.excitation) = (ThrustVector::NONE, Reference::ORIGIN, Vector3::zeros());
-        self.on_the_way.clear();
     }
 
     /// Puts an add-on before the configured loops, with the lanes given, in the place of the one that was there.
@@ -226,12 +218,6 @@ impl<'m> Flight<'m> {
         self.excitation = offset;
     }
 
-    /// Delays the position loop's command on its way to the attitude loop by this many control ticks (0 in flight): the link of
-    /// a position loop off board, or a robustness test. What does not fit into the queue is applied at once.
-    pub fn set_command_delay(&mut self, ticks: u32) {
-        self.command_delay = ticks;
-    }
-
     /// One control tick, the network included.
     pub fn step<const S: usize>(&mut self, tick: Tick, state: &State, scratch: &mut Scratch<S>) -> MotorCommand {
         let (command, job) = self.control(tick, state);
@@ -253,31 +239,46 @@ impl<'m> Flight<'m> {
 
     /// [`Flight::control`] that puts the job, if there is one, where the caller has room for it: `true`.
     pub fn control_into(&mut self, tick: Tick, state: &State, job: &mut Job) -> (MotorCommand, bool) {
-        let mut released = false;
+        let (wanted, released) = self.position_step(tick, state, job, |_| ());
+        if let Some(wanted) = wanted {
+            self.wanted = wanted;
+        }
+        (self.attitude_step(&self.wanted, state), released)
+    }
+
+    /// The first half of a control tick: at a reference tick what the position loop wants of the attitude loop, and whether `job` was
+    /// written. In flight [`Flight::control`] hands the one to the other at once; a simulator puts here what it wants to know the
+    /// effect of: a command that is late, or, in `path`, a feedback lane of which the loop gets more or less than the lane knows
+    /// ([`Adapter::finish_through`]).
+    pub fn position_step(
+        &mut self,
+        tick: Tick,
+        state: &State,
+        job: &mut Job,
+        path: impl FnOnce(&mut [f32; MAX_AXES]),
+    ) -> (Option<ThrustVector>, bool) {
         let (loops, adapter) = match &mut self.stage {
-            Stage::Empty => return (MotorCommand::OFF, released),
+            Stage::Empty => return (None, false),
             Stage::Baseline(loops) => (loops, None),
             Stage::Adapted(loops) => (loops, Some(&mut self.adapter)),
         };
-        if tick.0.is_multiple_of(loops.position_divisor.get()) {
-            let reference_tick = (tick.0 / loops.position_divisor) as i32;
-            (self.reference, released) = adapted(&self.preview, adapter, reference_tick, state, job);
-            if self.excitation != Vector3::zeros() {
-                self.reference.position += self.excitation;
-            }
-            let wanted = loops.position.step(&self.reference, state);
-            if tick.0 == 0 {
-                self.wanted = wanted;
-            }
-            if let Err((_, wanted)) = self.on_the_way.push_back((tick.0.wrapping_add(self.command_delay), wanted)) {
-                self.wanted = wanted;
-            }
+        if !tick.0.is_multiple_of(loops.position_divisor.get()) {
+            return (None, false);
         }
-        while let Some((_, wanted)) = self.on_the_way.pop_front_if(|(due, _)| *due <= tick.0) {
-            self.wanted = wanted;
+        let reference_tick = (tick.0 / loops.position_divisor) as i32;
+        let (reference, released) = adapted(&self.preview, adapter, reference_tick, state, job, path);
+        self.reference = reference;
+        if self.excitation != Vector3::zeros() {
+            self.reference.position += self.excitation;
         }
-        let (thrust, moment) = loops.attitude.step(&self.wanted, state);
-        (loops.mixer.mix(thrust, &moment), released)
+        (Some(loops.position.step(&self.reference, state)), released)
+    }
+
+    /// The second half of a control tick: what the motors get for what the position loop wants.
+    pub fn attitude_step(&self, wanted: &ThrustVector, state: &State) -> MotorCommand {
+        let Some(loops) = self.stage.loops() else { return MotorCommand::OFF };
+        let (thrust, moment) = loops.attitude.step(wanted, state);
+        loops.mixer.mix(thrust, &moment)
     }
 
     /// Takes what came of a job of [`Flight::control`].
@@ -293,6 +294,7 @@ fn adapted(
     tick: i32,
     state: &State,
     job: &mut Job,
+    path: impl FnOnce(&mut [f32; MAX_AXES]),
 ) -> (Reference, bool) {
     let desired = preview.sample(tick);
     let yaw = desired[9];
@@ -300,7 +302,7 @@ fn adapted(
         Some(adapter) => {
             let measured = quadrotor::measured(state);
             let released = adapter.begin_into(tick, preview, &measured, job);
-            (quadrotor::reference(&adapter.finish(tick, preview, &measured), yaw), released)
+            (quadrotor::reference(&adapter.finish_through(tick, preview, &measured, path), yaw), released)
         }
         None => {
             let [px, py, pz, vx, vy, vz, ..] = desired;

@@ -18,8 +18,6 @@ pub(super) struct Wanted {
     /// How far the lanes are faded in, 0..=1.
     pub(super) network_weight: f32,
     pub(super) feedback_weight: f32,
-    /// Factor on the feedback lane's part, unknown to the lane.
-    pub(super) loop_gain: f32,
 }
 
 /// What came of it.
@@ -49,13 +47,21 @@ impl Correction {
         self.values.iter().any(|value| *value != 0.0)
     }
 
-    /// Adds the lanes to `reference`, within limits and slew.
-    pub(super) fn apply(&mut self, card: &Card<'_>, wanted: &Wanted, reference: &mut [f32]) -> Applied {
+    /// Adds the lanes to `reference`, within limits and slew; the feedback lane's part by way of `path`.
+    pub(super) fn apply(
+        &mut self,
+        card: &Card<'_>,
+        wanted: &Wanted,
+        path: impl FnOnce(&mut [f32; MAX_AXES]),
+        reference: &mut [f32],
+    ) -> Applied {
+        let mut asked = wanted.feedback.map(|value| value * wanted.feedback_weight);
+        path(&mut asked);
         let mut feedback = [None; MAX_OUTPUTS];
         let axes = card.lane.iter().flat_map(|lane| &lane.axes);
-        for (axis, value) in axes.clone().zip(wanted.feedback) {
+        for (axis, value) in axes.clone().zip(asked) {
             if let Some(place) = feedback.get_mut(usize::from(axis.output)) {
-                *place = Some(value * wanted.feedback_weight * wanted.loop_gain);
+                *place = Some(value);
             }
         }
         let mut applied = Applied { shares: self.shadow(card, &wanted.network), ..Applied::default() };
