@@ -14,7 +14,7 @@ mod signals;
 use crate::{
     features,
     format::{Card, Channels, EndRule, Interpolation, MAX_AXES, MAX_FEATURES, MAX_OUTPUTS, Refusal},
-    guard::{Findings, Guard, GuardSettings, Trips, finite},
+    guard::{Features, Guard, GuardSettings, Observation, Outcome, Trips, Verdict, finite},
     math::finite_or_zero,
     model::Model,
     network::Scratch,
@@ -52,6 +52,14 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
     network_weight: f32,
     feedback_weight: f32,
     correction: Correction,
+    /// What the guard is shown at the next tick: what the lanes did in this one,
+    outcome: Outcome,
+    /// whether a lane was wanted or acted, so that it counts,
+    acted: bool,
+    /// the features since then,
+    features: Features,
+    /// and how old the newest measurement is, reference ticks.
+    age: u16,
 }
 
 impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
@@ -60,7 +68,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     pub const fn empty() -> Self {
         Self {
             model: None,
-            guard: Guard::VACANT,
+            guard: Guard::EMPTY,
             base: [0; R],
             measured: History::new([EndRule::Hold; M], 0),
             references: History::new([EndRule::Hold; R], 0),
@@ -71,6 +79,10 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             network_weight: 0.0,
             feedback_weight: 0.0,
             correction: Correction::NONE,
+            outcome: Outcome::NONE,
+            acted: false,
+            features: Features::Unchanged,
+            age: 0,
         }
     }
 
@@ -109,7 +121,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     /// Makes this, in its place, what [`Adapter::new`] makes of a model that passes [`Adapter::check`]. With another one it is as safe, and of no use.
     pub fn load(&mut self, model: &'m Model<'m>, table: &Channels<'_>) {
         self.model = Some(model);
-        self.guard.tie(GuardSettings::default(), model.card().timing.reference_rate_hz);
+        self.guard.load(GuardSettings::default(), model.card().timing.reference_rate_hz);
         self.base = base_channels(table);
         self.deferred = false;
         self.restart();
@@ -126,7 +138,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.reset();
         self.ramp = Ramp::EMPTY;
         self.correction = Correction::NONE;
-        self.guard.renew();
+        self.guard.restart();
         self.switch(Lanes::NONE);
     }
 
@@ -139,7 +151,8 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.feedback.reset();
         (self.network_weight, self.feedback_weight) = (0.0, 0.0);
         self.correction.values = [0.0; MAX_OUTPUTS];
-        self.guard.land();
+        (self.acted, self.features, self.age) = (false, Features::Unchanged, 0);
+        self.guard.reset();
     }
 
     /// The model that is flown.
@@ -175,7 +188,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
 
     /// Tells how many reference ticks ago the newest measurement arrived; 0 from the start.
     pub fn set_age(&mut self, ticks: u16) {
-        self.guard.set_age(ticks);
+        self.age = ticks;
     }
 
     /// Correction of each output of the model in the last tick.
@@ -234,7 +247,6 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         // A ramp ends where the inference of its start says, which is needed from the next reference tick on.
         self.ramp.settle(tick);
         let Some(model) = self.model else { return false };
-        let guard = &mut self.guard;
         let divisor = divisor(model.card());
         if tick.rem_euclid(divisor) != 0 {
             return false;
@@ -247,12 +259,12 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             self.references.restart([EndRule::Hold; R], sub_tick.wrapping_sub(1));
             self.references.push(base(&self.base, &preview.sample(tick)));
             self.ramp.clear();
-            guard.restart();
+            self.acted = false;
         }
         self.measured.push(measured.map(finite_or_zero));
         if !(self.lanes.network || self.network_weight > 0.0) || model.network().is_none() {
             self.ramp.clear();
-            guard.no_features();
+            self.features = Features::Unknown;
             return false;
         }
         let card = model.card();
@@ -264,7 +276,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         let view = View { desired: preview, measured: &self.measured, references: &self.references, divisor };
         features::evaluate(&card.features, &view, tick.wrapping_add(ahead), divisor, &mut job.inputs);
         let (inputs, _) = job.inputs.split_at_checked(card.features.len()).unwrap_or_default();
-        guard.features(inputs, &model.envelope());
+        self.features = Features::compare(inputs, &model.envelope(), self.guard.settings());
         self.ramp.release(tick);
         true
     }
@@ -292,7 +304,6 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         let desired = preview.sample(tick);
         let mut reference = base(&self.base, &desired);
         let Some(model) = self.model else { return reference };
-        let guard = &mut self.guard;
         let card = model.card();
         let divisor = divisor(card);
         let interpolation = card.timing.interpolation;
@@ -300,12 +311,19 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             self.ramp.publish();
         }
         let network = self.ramp.value(interpolation, tick.rem_euclid(divisor), divisor);
-        guard
-            .judge(self.lanes, Findings { not_finite: !(finite(measured) && finite(&desired)), late: self.ramp.late_in_a_row() });
+        let Verdict { allowed, handover_step } = self.guard.tick(&Observation {
+            lane: card.lane.as_ref(),
+            monitor: model.monitor(),
+            wanted: self.lanes,
+            last: self.acted.then_some(&self.outcome),
+            features: core::mem::replace(&mut self.features, Features::Unchanged),
+            finite: finite(measured) && finite(&desired),
+            late: self.ramp.late_in_a_row(),
+            age: self.age,
+        });
         // The network lane has a value from its first sub-rate tick on: a fade that began before would end in a step.
         let present = Lanes { network: self.ramp.current() && model.network().is_some(), feedback: model.lane().is_some() };
-        let allowed = guard.allowed(self.lanes);
-        let fade = Fade::new(card.timing.fade_ticks, guard.handover_step());
+        let fade = Fade::new(card.timing.fade_ticks, handover_step);
         self.network_weight = fade.next(self.network_weight, self.lanes.network, allowed.network, present.network);
         self.feedback_weight = fade.next(self.feedback_weight, self.lanes.feedback, allowed.feedback, present.feedback);
         let errors = feedback::errors(model, tick, preview, measured);
@@ -318,20 +336,15 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         };
         let acting = self.correction.left() || self.network_weight > 0.0 || self.feedback_weight > 0.0;
         let applied = if acting {
-            self.correction.apply(card, &wanted, path, &mut reference)
+            self.correction.apply(card, &wanted, path, &mut reference, &mut self.outcome)
         } else {
-            self.correction.clear(card, &wanted)
+            self.correction.clear(card, &wanted, &mut self.outcome)
         };
-        self.feedback.applied(model, &applied.feedback);
-        if acting || self.lanes != Lanes::NONE {
-            guard.excess(applied.excess);
-            guard.swing(card.lane.as_ref().filter(|_| engaged).map(|lane| (lane, &wanted.feedback)));
-            if let Some(monitor) = model.monitor() {
-                let errors = feedback::monitored(model, tick, preview, measured, &errors);
-                guard.observe(monitor, &errors, &applied.shares);
-            }
-        } else {
-            guard.restart();
+        self.feedback.applied(model, &applied);
+        self.acted = acting || self.lanes != Lanes::NONE;
+        if self.acted {
+            (self.outcome.engaged, self.outcome.asked) = (engaged, wanted.feedback);
+            self.outcome.errors = feedback::monitored(model, tick, preview, measured, &errors);
         }
         if self.feedback_weight == 0.0 {
             self.feedback.release();
