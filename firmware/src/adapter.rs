@@ -5,30 +5,29 @@
 //! user or by the [guard](crate::guard); *source* Zhou 2017, Fig. 1. What differs: the correction is ramped between sub-rate ticks, and a feedback lane adds to it.
 
 mod correction;
+mod fade;
 mod feedback;
 mod inference;
-mod lanes;
 mod ramp;
 mod signals;
 
 use crate::{
     features,
-    guard::{Findings, Guard, GuardSettings, Trips, finite},
+    format::{Card, Channels, EndRule, Interpolation, MAX_AXES, MAX_FEATURES, MAX_OUTPUTS, Refusal},
+    guard::{Features, Guard, GuardSettings, Observation, Outcome, Trips, Verdict, finite},
     math::finite_or_zero,
-    model::{Card, Channels, Interpolation, MAX_FEATURES, MAX_OUTPUTS, Model, Refusal},
+    model::Model,
     network::Scratch,
-    preview::{EndRule, Preview},
+    preview::Preview,
 };
 use correction::{Correction, Wanted};
+use fade::Fade;
 use feedback::Feedback;
 pub use inference::{Inference, Job};
-use lanes::Fade;
-pub use lanes::Lanes;
 use ramp::Ramp;
 use signals::{History, View, base_channels, same_signals};
 
-/// Sub-rate ticks of measured and reference history that features can read.
-pub const HISTORY: usize = 16;
+pub use crate::{format::HISTORY, lanes::Lanes};
 
 /// Adapter for a loop with `D` desired, `M` measured and `R` reference channels.
 ///
@@ -53,16 +52,23 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
     network_weight: f32,
     feedback_weight: f32,
     correction: Correction,
-    loop_gain: f32,
+    /// What the guard is shown at the next tick: what the lanes did in this one,
+    outcome: Outcome,
+    /// whether a lane was wanted or acted, so that it counts,
+    acted: bool,
+    /// the features since then,
+    features: Features,
+    /// and how old the newest measurement is, reference ticks.
+    age: u16,
 }
 
 impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     /// An adapter without a model, which corrects nothing: all zeros. It is 6 KB large, so a microcontroller has it in a static, or in
-    /// something that is one, and [ties](Adapter::tie) it there.
-    pub const fn parked() -> Self {
+    /// something that is one, and [loads](Adapter::load) it there.
+    pub const fn empty() -> Self {
         Self {
             model: None,
-            guard: Guard::VACANT,
+            guard: Guard::EMPTY,
             base: [0; R],
             measured: History::new([EndRule::Hold; M], 0),
             references: History::new([EndRule::Hold; R], 0),
@@ -73,7 +79,10 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             network_weight: 0.0,
             feedback_weight: 0.0,
             correction: Correction::NONE,
-            loop_gain: 0.0,
+            outcome: Outcome::NONE,
+            acted: false,
+            features: Features::Unchanged,
+            age: 0,
         }
     }
 
@@ -85,8 +94,8 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     pub fn new<'t>(model: &'m Model<'m>, table: impl Into<Channels<'t>>, rate_hz: f32, capacity: usize) -> Result<Self, Refusal> {
         let table = table.into();
         Self::check(model, &table, rate_hz, capacity)?;
-        let mut adapter = Self::parked();
-        adapter.tie(model, &table);
+        let mut adapter = Self::empty();
+        adapter.load(model, &table);
         Ok(adapter)
     }
 
@@ -110,11 +119,17 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     }
 
     /// Makes this, in its place, what [`Adapter::new`] makes of a model that passes [`Adapter::check`]. With another one it is as safe, and of no use.
-    pub fn tie(&mut self, model: &'m Model<'m>, table: &Channels<'_>) {
+    pub fn load(&mut self, model: &'m Model<'m>, table: &Channels<'_>) {
         self.model = Some(model);
-        self.guard.tie(GuardSettings::default(), model.card().timing.reference_rate_hz);
+        self.guard.load(GuardSettings::default(), model.card().timing.reference_rate_hz);
         self.base = base_channels(table);
-        (self.deferred, self.loop_gain) = (false, 1.0);
+        self.deferred = false;
+        self.restart();
+    }
+
+    /// Forgets the model too: no correction, and no job any more.
+    pub fn unload(&mut self) {
+        self.model = None;
         self.restart();
     }
 
@@ -123,7 +138,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.reset();
         self.ramp = Ramp::EMPTY;
         self.correction = Correction::NONE;
-        self.guard.renew();
+        self.guard.restart();
         self.switch(Lanes::NONE);
     }
 
@@ -136,7 +151,8 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.feedback.reset();
         (self.network_weight, self.feedback_weight) = (0.0, 0.0);
         self.correction.values = [0.0; MAX_OUTPUTS];
-        self.guard.land();
+        (self.acted, self.features, self.age) = (false, Features::Unchanged, 0);
+        self.guard.reset();
     }
 
     /// The model that is flown.
@@ -172,12 +188,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
 
     /// Tells how many reference ticks ago the newest measurement arrived; 0 from the start.
     pub fn set_age(&mut self, ticks: u16) {
-        self.guard.set_age(ticks);
-    }
-
-    /// Multiplies what the loop receives of the feedback lane, unknown to the lane: the loop gain of a robustness test. 1 in flight.
-    pub fn set_loop_gain(&mut self, gain: f32) {
-        self.loop_gain = gain;
+        self.age = ticks;
     }
 
     /// Correction of each output of the model in the last tick.
@@ -207,7 +218,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     }
 
     /// One reference tick with all that belongs to it: the reference that the loop shall track. `preview` should reach
-    /// [`crate::model::Card::preview_span`]'s future ahead; what is missing is taken as the trajectory's end. The scratch needs
+    /// [`crate::format::Card::preview_span`]'s future ahead; what is missing is taken as the trajectory's end. The scratch needs
     /// [`crate::network::Network::scratch_words`].
     pub fn step<const N: usize, const S: usize>(
         &mut self,
@@ -236,7 +247,6 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         // A ramp ends where the inference of its start says, which is needed from the next reference tick on.
         self.ramp.settle(tick);
         let Some(model) = self.model else { return false };
-        let guard = &mut self.guard;
         let divisor = divisor(model.card());
         if tick.rem_euclid(divisor) != 0 {
             return false;
@@ -249,12 +259,12 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             self.references.restart([EndRule::Hold; R], sub_tick.wrapping_sub(1));
             self.references.push(base(&self.base, &preview.sample(tick)));
             self.ramp.clear();
-            guard.restart();
+            self.acted = false;
         }
         self.measured.push(measured.map(finite_or_zero));
         if !(self.lanes.network || self.network_weight > 0.0) || model.network().is_none() {
             self.ramp.clear();
-            guard.no_features();
+            self.features = Features::Unknown;
             return false;
         }
         let card = model.card();
@@ -266,7 +276,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         let view = View { desired: preview, measured: &self.measured, references: &self.references, divisor };
         features::evaluate(&card.features, &view, tick.wrapping_add(ahead), divisor, &mut job.inputs);
         let (inputs, _) = job.inputs.split_at_checked(card.features.len()).unwrap_or_default();
-        guard.features(inputs, &model.envelope());
+        self.features = Features::compare(inputs, &model.envelope(), self.guard.settings());
         self.ramp.release(tick);
         true
     }
@@ -278,10 +288,22 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
 
     /// Second part of a reference tick: the reference that the loop shall track.
     pub fn finish<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M]) -> [f32; R] {
+        self.finish_through(tick, preview, measured, |_| ())
+    }
+
+    /// [`Adapter::finish`] in which what the feedback lane asks for on each axis, in the output's unit, goes through `path` on its way to the
+    /// bounds, unknown to the lane: in flight the identity, in a simulator what a robustness study asks (another loop gain).
+    #[inline]
+    pub fn finish_through<const N: usize>(
+        &mut self,
+        tick: i32,
+        preview: &Preview<D, N>,
+        measured: &[f32; M],
+        path: impl FnOnce(&mut [f32; MAX_AXES]),
+    ) -> [f32; R] {
         let desired = preview.sample(tick);
         let mut reference = base(&self.base, &desired);
         let Some(model) = self.model else { return reference };
-        let guard = &mut self.guard;
         let card = model.card();
         let divisor = divisor(card);
         let interpolation = card.timing.interpolation;
@@ -289,12 +311,19 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             self.ramp.publish();
         }
         let network = self.ramp.value(interpolation, tick.rem_euclid(divisor), divisor);
-        guard
-            .judge(self.lanes, Findings { not_finite: !(finite(measured) && finite(&desired)), late: self.ramp.late_in_a_row() });
+        let Verdict { allowed, handover_step } = self.guard.tick(&Observation {
+            lane: card.lane.as_ref(),
+            monitor: model.monitor(),
+            wanted: self.lanes,
+            last: self.acted.then_some(&self.outcome),
+            features: core::mem::replace(&mut self.features, Features::Unchanged),
+            finite: finite(measured) && finite(&desired),
+            late: self.ramp.late_in_a_row(),
+            age: self.age,
+        });
         // The network lane has a value from its first sub-rate tick on: a fade that began before would end in a step.
         let present = Lanes { network: self.ramp.current() && model.network().is_some(), feedback: model.lane().is_some() };
-        let allowed = guard.allowed(self.lanes);
-        let fade = Fade::new(card.timing.fade_ticks, guard.handover_step());
+        let fade = Fade::new(card.timing.fade_ticks, handover_step);
         self.network_weight = fade.next(self.network_weight, self.lanes.network, allowed.network, present.network);
         self.feedback_weight = fade.next(self.feedback_weight, self.lanes.feedback, allowed.feedback, present.feedback);
         let errors = feedback::errors(model, tick, preview, measured);
@@ -304,21 +333,18 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             feedback: self.feedback.step(model, tick, preview, &errors, engaged),
             network_weight: self.network_weight,
             feedback_weight: self.feedback_weight,
-            loop_gain: self.loop_gain,
         };
         let acting = self.correction.left() || self.network_weight > 0.0 || self.feedback_weight > 0.0;
-        let applied =
-            if acting { self.correction.apply(card, &wanted, &mut reference) } else { self.correction.clear(card, &wanted) };
-        self.feedback.applied(model, &applied.feedback);
-        if acting || self.lanes != Lanes::NONE {
-            guard.excess(applied.excess);
-            guard.swing(card.lane.as_ref().filter(|_| engaged).map(|lane| (lane, &wanted.feedback)));
-            if let Some(monitor) = model.monitor() {
-                let errors = feedback::monitored(model, tick, preview, measured, &errors);
-                guard.observe(monitor, &errors, &applied.shares);
-            }
+        let applied = if acting {
+            self.correction.apply(card, &wanted, path, &mut reference, &mut self.outcome)
         } else {
-            guard.restart();
+            self.correction.clear(card, &wanted, &mut self.outcome)
+        };
+        self.feedback.applied(model, &applied);
+        self.acted = acting || self.lanes != Lanes::NONE;
+        if self.acted {
+            (self.outcome.engaged, self.outcome.asked) = (engaged, wanted.feedback);
+            self.outcome.errors = feedback::monitored(model, tick, preview, measured, &errors);
         }
         if self.feedback_weight == 0.0 {
             self.feedback.release();

@@ -4,43 +4,7 @@
 //! *source* Zhou 2017, Insight 2 (state-space and transfer-function features) and Insight 3 (difference learning).
 //! The 12-input, 36-input and window sets of the literature are lists of these, not code.
 
-use serde::{Deserialize, Serialize};
-
-/// Where a feature's value comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum Source {
-    /// The desired trajectory.
-    Desired,
-    /// The measured signals.
-    Measured,
-    /// The reference that the loop received in the past.
-    Reference,
-}
-
-/// What is subtracted from a feature: the same quantity, now.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum Relative {
-    /// Nothing: the absolute value.
-    Nothing,
-    /// The desired channel of this index, now.
-    Desired(u8),
-    /// The measured channel of this index, now.
-    Measured(u8),
-}
-
-/// One network input.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Feature {
-    /// Signal that is read.
-    pub source: Source,
-    /// Channel of that signal (index into the model's signal table).
-    pub channel: u8,
-    /// Time offset in sub-rate ticks; positive is the future (desired only).
-    pub offset: i16,
-    /// What is subtracted.
-    pub relative: Relative,
-}
+pub use crate::format::{Feature, Relative, Source};
 
 /// Signals as features read them; ticks are reference ticks.
 pub trait Signals {

@@ -8,8 +8,8 @@
 use heapless::Vec;
 
 use crate::{
+    format::{Blob, Floats, LaneAxis, LaneLayout, MAX_AXES, MAX_ERRORS, MAX_LAGS, Refusal},
     math::{abs, clamp, finite_or_zero},
-    model::{Blob, Floats, LaneAxis, LaneLayout, MAX_AXES, MAX_ERRORS, MAX_LAGS, Refusal},
 };
 
 /// Length of the standard error sequence of the lane's probe, ticks.

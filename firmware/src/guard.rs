@@ -9,100 +9,21 @@
 
 mod evidence;
 mod monitor;
+mod observation;
 mod oscillation;
 mod settings;
+mod trip;
 mod watch;
 
-use crate::{
-    adapter::Lanes,
-    math::abs,
-    model::{Floats, LaneLayout, MAX_AXES},
-};
+use crate::{lanes::Lanes, math::abs};
 
 pub use evidence::Evidence;
-pub(crate) use evidence::Shares;
 pub use monitor::Monitor;
+pub(crate) use observation::{Features, Observation, Outcome, Shares, Verdict};
 use oscillation::Oscillation;
 pub use settings::GuardSettings;
+pub use trip::{Trip, Trips};
 use watch::{Watch, leak};
-
-/// Why a lane is off although it is wanted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[repr(u8)]
-pub enum Trip {
-    /// Features outside of the training envelope (network lane).
-    Envelope = 0,
-    /// A measured or desired channel that is no finite number (both lanes).
-    NotFinite = 1,
-    /// A measurement that is too old (both lanes).
-    Stale = 2,
-    /// A correction at its limit or slew for too long (each lane that asks for more).
-    Saturated = 3,
-    /// The loop would track better without the lane (each lane by itself).
-    Evidence = 4,
-    /// Inferences that come too late (network lane).
-    Late = 5,
-    /// A limit cycle (feedback lane).
-    Oscillation = 6,
-}
-
-impl Trip {
-    /// All reasons, in the order of their indices.
-    pub const ALL: [Self; 7] =
-        [Self::Envelope, Self::NotFinite, Self::Stale, Self::Saturated, Self::Evidence, Self::Late, Self::Oscillation];
-
-    /// Index in [`Trips`]; the same in every version.
-    pub fn index(self) -> usize {
-        self as usize
-    }
-
-    /// Name for tables and telemetry.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Envelope => "envelope",
-            Self::NotFinite => "not_finite",
-            Self::Stale => "stale",
-            Self::Saturated => "saturated",
-            Self::Evidence => "evidence",
-            Self::Late => "late",
-            Self::Oscillation => "oscillation",
-        }
-    }
-}
-
-/// Trips since the start, by [`Trip::index`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Trips {
-    /// Of the network lane.
-    pub network: [u16; Trip::ALL.len()],
-    /// Of the feedback lane.
-    pub feedback: [u16; Trip::ALL.len()],
-}
-
-impl Trips {
-    /// None.
-    pub const NONE: Self = Self { network: [0; Trip::ALL.len()], feedback: [0; Trip::ALL.len()] };
-
-    /// Trips of the network lane and of the feedback lane.
-    pub fn by_lane(&self) -> [u16; 2] {
-        [self.network, self.feedback].map(|lane| lane.iter().fold(0, |sum, count| count.saturating_add(sum)))
-    }
-
-    /// Trips of both lanes for a reason.
-    pub fn of(&self, trip: Trip) -> u16 {
-        let count = |lane: &[u16]| lane.get(trip.index()).copied().unwrap_or(0);
-        count(&self.network).saturating_add(count(&self.feedback))
-    }
-}
-
-/// What one reference tick found wrong, beside the evidence.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Findings {
-    /// A channel of this tick is no finite number.
-    pub(crate) not_finite: bool,
-    /// Inferences in a row that came too late.
-    pub(crate) late: u16,
-}
 
 /// Decides which lanes may act.
 #[derive(Clone, Debug)]
@@ -112,8 +33,6 @@ pub struct Guard {
     rate_hz: f32,
     network: Watch,
     feedback: Watch,
-    /// Reference ticks since the newest measurement was taken or arrived.
-    age: u16,
     /// Sub-rate ticks in a row with features outside of the envelope.
     outside: u16,
     /// Recent share of ticks in which each lane asked for more than the bounds let pass.
@@ -125,12 +44,11 @@ pub struct Guard {
 
 impl Guard {
     /// A guard without a loop, which has seen nothing: all zeros, so that a static with it takes no flash.
-    pub(crate) const VACANT: Self = Self {
+    pub(crate) const EMPTY: Self = Self {
         settings: GuardSettings::NONE,
         rate_hz: 0.0,
         network: Watch::ARMED,
         feedback: Watch::ARMED,
-        age: 0,
         outside: 0,
         excess: [0.0; 2],
         oscillation: Oscillation::NONE,
@@ -139,15 +57,15 @@ impl Guard {
     };
 
     /// Makes this, in its place, a guard that has seen nothing yet, of a loop with this many reference ticks in a second.
-    pub(crate) fn tie(&mut self, settings: GuardSettings, rate_hz: f32) {
+    pub(crate) fn load(&mut self, settings: GuardSettings, rate_hz: f32) {
         (self.settings, self.rate_hz) = (settings, rate_hz);
-        self.renew();
+        self.restart();
     }
 
-    /// Forgets everything but the settings.
-    pub(crate) fn renew(&mut self) {
+    /// As loaded: forgets what was seen, and the counts.
+    pub(crate) fn restart(&mut self) {
         self.trips = Trips::NONE;
-        self.land();
+        self.reset();
     }
 
     /// Other settings; what was seen and counted stays.
@@ -158,11 +76,18 @@ impl Guard {
         }
     }
 
-    /// Forgets everything but the settings and the counts: the vehicle has landed.
-    pub(crate) fn land(&mut self) {
+    /// Forgets what was seen; settings and counts stay.
+    pub(crate) fn reset(&mut self) {
         self.rearm();
-        (self.age, self.outside) = (0, 0);
-        self.restart();
+        self.outside = 0;
+        self.clear();
+    }
+
+    /// Empties all that was learned of the lanes' doing.
+    fn clear(&mut self) {
+        self.evidence.reset();
+        self.excess = [0.0; 2];
+        self.oscillation = Oscillation::NONE;
     }
 
     /// Of the lanes wanted those that may act.
@@ -194,49 +119,52 @@ impl Guard {
         }
     }
 
-    /// Tells how old the newest measurement is, reference ticks beyond the model's delay.
-    pub(crate) fn set_age(&mut self, ticks: u16) {
-        self.age = ticks;
+    /// Settings in force.
+    pub(crate) fn settings(&self) -> &GuardSettings {
+        &self.settings
     }
 
-    /// Least change of weight in a reference tick of a lane that trips.
-    pub(crate) fn handover_step(&self) -> f32 {
-        leak(1.0 / (self.settings.handover_s * self.rate_hz))
-    }
-
-    /// Forgets the evidence: no lane acts, or ticks are missing.
-    pub(crate) fn restart(&mut self) {
-        self.evidence.restart();
-        self.excess = [0.0; 2];
-        self.oscillation = Oscillation::NONE;
-    }
-
-    /// Takes the features of a sub-rate tick and the box of those in training.
-    pub(crate) fn features(&mut self, features: &[f32], (low, high): &(Floats<'_>, Floats<'_>)) {
-        let margin = self.settings.envelope_margin;
-        let inside = |((low, high), &feature): ((f32, f32), &f32)| {
-            let slack = margin * (high - low) + self.settings.envelope_floor;
-            // Written so that what is no number is outside.
-            feature >= low - slack && feature <= high + slack
+    /// One reference tick, before the lanes act: learns what they did in the last one, then judges what is seen now.
+    pub(crate) fn tick(&mut self, seen: &Observation<'_>) -> Verdict {
+        self.learn(seen);
+        self.outside = match seen.features {
+            Features::Unchanged => self.outside,
+            Features::Unknown | Features::Inside => 0,
+            Features::Outside => self.outside.saturating_add(1),
         };
-        let all = low.iter().zip(high.iter()).zip(features).all(inside);
-        self.outside = if all { 0 } else { self.outside.saturating_add(1) };
-    }
-
-    /// The network lane is not evaluated: nothing is known of its features.
-    pub(crate) fn no_features(&mut self) {
-        self.outside = 0;
-    }
-
-    /// Judges a reference tick before the lanes act.
-    pub(crate) fn judge(&mut self, wanted: Lanes, findings: Findings) {
-        if !self.settings.enabled {
-            return;
+        if self.settings.enabled {
+            self.judge(seen);
         }
+        let handover_step = leak(1.0 / (self.settings.handover_s * self.rate_hz));
+        Verdict { allowed: self.allowed(seen.wanted), handover_step }
+    }
+
+    /// What the lanes did in the last reference tick. If none acted, or ticks are missing since, all that was learned is forgotten.
+    fn learn(&mut self, seen: &Observation<'_>) {
+        let Some(last) = seen.last else {
+            self.clear();
+            return;
+        };
         let settings = &self.settings;
-        let stale = f32::from(self.age) > settings.stale_s * self.rate_hz;
+        let decay = leak(1.0 / (settings.saturated_s * self.rate_hz));
+        for (share, excess) in self.excess.iter_mut().zip(last.excess) {
+            *share += (f32::from(u8::from(excess)) - *share) * decay;
+        }
+        match seen.lane.filter(|_| last.engaged) {
+            Some(lane) => self.oscillation.observe(lane, &last.asked, settings, self.rate_hz),
+            None => self.oscillation = Oscillation::NONE,
+        }
+        if let Some(monitor) = seen.monitor {
+            self.evidence.observe(monitor, &last.errors, &last.shares, settings, self.rate_hz);
+        }
+    }
+
+    /// Trips lanes and lets them come back.
+    fn judge(&mut self, seen: &Observation<'_>) {
+        let settings = &self.settings;
+        let stale = f32::from(seen.age) > settings.stale_s * self.rate_hz;
         let outside = self.outside >= settings.envelope_ticks.max(1);
-        let late = findings.late >= settings.late_in_a_row.max(1);
+        let late = seen.late >= settings.late_in_a_row.max(1);
         let [network_excess, feedback_excess] = self.excess.map(|share| share > settings.saturated_share);
         let [network_harms, feedback_harms] = self.evidence.harmful();
         let swings = self.oscillation.present(settings);
@@ -244,7 +172,7 @@ impl Guard {
         let cause = |own: [bool; 5]| {
             let [outside, late, swings, excess, harms] = own;
             first([
-                (findings.not_finite, Trip::NotFinite),
+                (!seen.finite, Trip::NotFinite),
                 (stale, Trip::Stale),
                 (outside, Trip::Envelope),
                 (late, Trip::Late),
@@ -253,8 +181,8 @@ impl Guard {
                 (harms, Trip::Evidence),
             ])
         };
-        let network = cause([outside, late, false, network_excess, network_harms]).filter(|_| wanted.network);
-        let feedback = cause([false, false, swings, feedback_excess, feedback_harms]).filter(|_| wanted.feedback);
+        let network = cause([outside, late, false, network_excess, network_harms]).filter(|_| seen.wanted.network);
+        let feedback = cause([false, false, swings, feedback_excess, feedback_harms]).filter(|_| seen.wanted.feedback);
         let hold = (settings.hold_s * self.rate_hz) as u32;
         let network = self.network.tick(network, hold, settings);
         let feedback = self.feedback.tick(feedback, hold, settings);
@@ -263,27 +191,6 @@ impl Guard {
                 *count = count.saturating_add(1);
             }
         }
-    }
-
-    /// Learns what the lanes did at a reference tick: of each whether it asked for more than the bounds let pass, and whether it acts.
-    pub(crate) fn excess(&mut self, excess: [bool; 2]) {
-        let decay = leak(1.0 / (self.settings.saturated_s * self.rate_hz));
-        for (share, excess) in self.excess.iter_mut().zip(excess) {
-            *share += (f32::from(u8::from(excess)) - *share) * decay;
-        }
-    }
-
-    /// Learns what the feedback lane asks for on each axis at a reference tick; `None` while it is not to act.
-    pub(crate) fn swing(&mut self, asked: Option<(&LaneLayout, &[f32; MAX_AXES])>) {
-        match asked {
-            Some((lane, wanted)) => self.oscillation.observe(lane, wanted, &self.settings, self.rate_hz),
-            None => self.oscillation = Oscillation::NONE,
-        }
-    }
-
-    /// Adds a reference tick to the evidence.
-    pub(crate) fn observe(&mut self, monitor: &Monitor<'_>, errors: &[f32], shares: &Shares) {
-        self.evidence.observe(monitor, errors, shares, &self.settings, self.rate_hz);
     }
 }
 

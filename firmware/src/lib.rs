@@ -1,36 +1,71 @@
-//! Everything that flies: a learned add-on for control loops, and the quadrotor loop that is its first user.
+//! A learned add-on for any control loop: it corrects the references of a loop that is stable without it.
 //!
 //! ```text
-//! desired trajectory ──► features ──► network lane (sub-rate, interpolated) ──┐
-//!       (preview)           ▲                                                 ├─► correction ─► adapted reference ─► baseline loop ─► motors
-//!                           │   ┌─► feedback lane (every reference tick) ─────┘    (bounded)      (every tick)            ▲
-//!                           └───┴──────────────────── measured state ─────────────────────────────────────────────────────┘
+//! desired ──► preview ──► features ──► network lane (sub-rate, ramped) ──┐
+//! trajectory     │           ▲                                           ├─► guard ─► limits, slew ─► reference ─► any loop
+//!                └─► errors ─┼─► feedback lane (every reference tick) ───┘    ▲            │                          │
+//!                      ▲     │                                                └─ observes ─┘                          │
+//!                      └─────┴───────────────────── measured state ◄──────────────────────────────────────────────────┘
 //! ```
 //!
-//! `no_std`, no heap, no unsafe code but in the Cortex-M4 kernels, no clock: time is an argument. SI units; world frame ENU (z up), body frame FLU, Hamilton quaternion
-//! body to world, f32. The same bits on the host and on a Cortex-M4F. Errors exist where bytes enter
-//! ([`model::Model::from_bytes`], [`storage`]); in flight nothing returns a `Result`.
+//! `no_std`, no heap, no unsafe code but in the Cortex-M4 kernels, no clock: time is an argument. SI units, f32; which channels
+//! there are, and in which frames, says the model. The same bits on the host and on a Cortex-M4F. Errors exist where bytes enter
+//! ([`Model::from_bytes`](model::Model::from_bytes), [`storage`]); in flight nothing returns a `Result`.
+//!
+//! # Layers
+//!
+//! At the bottom stand functions and values that know nothing of a model. On them stands what is stored of one: bytes and types.
+//! Each part of a model that is evaluated (features, network, feedback lane, the loop's response by which the guard judges)
+//! stands on the format alone, and the checked model on all of them. The adapter runs a model before a loop: in each reference
+//! tick it evaluates what is due, shows the guard one observation, and adds what the guard allows within limits and slew. What is
+//! above may use what is below, never the other way round:
+//!
+//! | layer | modules | what they hold |
+//! |--:|---|---|
+//! | 1 | `math` | elementary functions with the same bits on every machine |
+//! | 1 | `lanes` | which of the two lanes act |
+//! | 1 | `exchange` | hand-over between tasks without a lock: newest value, queue of bytes |
+//! | 2 | `format` | a model file: its bytes, the types that they become, why one is refused |
+//! | 2 | `region` | which of several modules acts, by operating region |
+//! | 3 | `preview` | the desired trajectory around the present |
+//! | 3 | `features` | network inputs, evaluated from the list in the model |
+//! | 3 | `network` | the network lane's map, with its kernels |
+//! | 3 | `feedback` | the feedback lane's map and its memory |
+//! | 4 | `guard` | which lanes may act: inputs, limits, and what the error would be without a lane |
+//! | 5 | `model` | a model file whose every index, shape and probe has been checked |
+//! | 6 | `adapter` | the add-on: lanes, guard and bounds between the desired trajectory and a loop |
+//! | 6 | `storage` | models in flash, replaced without a new program |
+//!
+//! # Words
+//!
+//! - `reset` forgets what was seen: the next tick is the first one. Settings, models, the lanes wanted and counts stay.
+//! - `restart` does that, and sets counts to zero and lanes off: as just loaded or configured.
+//! - `clear` empties one buffer.
+//!
+//! A lane that comes or goes is ramped by its weight (bumpless transfer); in the code that is a *fade*. *Refusal* is why a model
+//! is not flown, [`StorageError`](storage::StorageError) why it is not stored.
 #![cfg_attr(not(test), no_std)]
 // Tests may compare with the standard library.
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 
-pub mod math;
-pub mod preview;
-
-pub mod features;
-
-pub mod model;
-
-pub mod network;
-
-pub mod feedback;
-
-pub mod guard;
-
 pub mod adapter;
-
-pub mod region;
-
 pub mod exchange;
-
+pub mod features;
+pub mod feedback;
+pub mod format;
+pub mod guard;
+pub mod lanes;
+pub mod math;
+pub mod model;
+pub mod network;
+pub mod preview;
+pub mod region;
 pub mod storage;
+
+pub use adapter::{Adapter, Inference, Job};
+pub use format::{Channel, Channels, EndRule, Refusal};
+pub use guard::{GuardSettings, Trip, Trips};
+pub use lanes::Lanes;
+pub use model::Model;
+pub use network::Scratch;
+pub use preview::Preview;

@@ -4,17 +4,7 @@
 //! *never* an index out of range: outside of what is stored the end rule answers;
 //! *source* Zhou 2017, section III-B (preview of r steps); the end rule is ours.
 
-use serde::{Deserialize, Serialize};
-
-/// What a channel is before the first and after the last sample.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum EndRule {
-    /// The nearest sample is held (positions, angles).
-    #[default]
-    Hold,
-    /// Zero (velocities, accelerations): the trajectory stands still beyond its ends.
-    Zero,
-}
+pub use crate::format::EndRule;
 
 /// Ring of the newest `N` samples of `D` desired channels, addressed by reference tick.
 #[derive(Clone, Debug)]

@@ -33,41 +33,18 @@
 mod error;
 mod header;
 mod ram;
+mod slot;
 mod stored;
 mod uploader;
 
-use embedded_storage::nor_flash::NorFlash;
-
-use crate::{
-    model::{Model, Refusal},
-    network::Scratch,
-};
+use crate::{format::Refusal, model::Model, network::Scratch};
 
 pub use error::{Operation, StorageError};
 pub use header::{HEADER, Header, MAGIC, Sequence, VERSION};
 pub use ram::RamFlash;
+pub use slot::Slot;
 pub use stored::{Place, Stored, Survey, survey};
 pub use uploader::{Arming, Uploader};
-
-/// A part of the flash that is erased alone and can be read in place.
-///
-/// Offsets of the driver start at the slot's first byte, and its capacity is the slot's: [`Uploader`] erases all of it. The first byte
-/// lies on a boundary of 16 bytes.
-///
-/// A board gets the bytes of its sectors without unsafe code from a static of zeros whose name memory.x places there and does not load, as
-/// it does with `IMPROMPTU_WEIGHTS`. It reads the static through [`core::hint::black_box`]: otherwise the compiler, who knows nothing of
-/// uploads, reads the zeros. For a model that lives as long as the program the slots are `&'static mut`, or the board calls [`survey`] with
-/// two `&'static [u8]` and makes the flash driver a slot for the spare one alone.
-pub trait Slot: NorFlash {
-    /// What the flash holds now, all of it. On a board with a cache before its flash, erasing and writing also empty the cache.
-    fn bytes(&self) -> &[u8];
-}
-
-impl<S: Slot> Slot for &mut S {
-    fn bytes(&self) -> &[u8] {
-        S::bytes(self)
-    }
-}
 
 /// Start-up: the newest model that is intact and passes `check` (signals, rate, preview of the application), and an uploader for the slot
 /// that it does not lie in.

@@ -93,7 +93,7 @@ fn script(file: &[u8]) -> (Vec<u8>, Vec<u8>) {
     let settings = Header::from_bytes(header).unwrap().settings;
 
     let mut flight = Flight::new(&settings).unwrap();
-    flight.attach(&model, &settings, Lanes::NONE).unwrap();
+    flight.attach(&model, Lanes::NONE).unwrap();
     let rate = settings.rates.reference_hz();
     let mut adapter = Adapter::<DESIRED, MEASURED, REFERENCE>::new(&model, quadrotor::signals(), rate, PREVIEW).unwrap();
     adapter.defer();

@@ -101,7 +101,7 @@ fn late_inferences_are_counted_and_leave_the_baseline() {
     let fly = |addon: bool, late_from: u32| {
         let mut flight = Flight::new(&plant.settings).unwrap();
         if addon {
-            flight.attach(&model, &plant.settings, network).unwrap();
+            flight.attach(&model, network).unwrap();
         }
         let mut scratch = Scratch::new();
         let mut commands = Vec::new();

@@ -46,7 +46,7 @@ impl Layout {
 
 /// A preview without a sample, and an adapter without a model: all zeros, so that they are written in place.
 pub(crate) const EMPTY: Preview<MAX_CHANNELS, PREVIEW> = Preview::new([EndRule::Hold; MAX_CHANNELS], 0);
-pub(crate) const PARKED: Adapter<'static, MAX_CHANNELS, MAX_CHANNELS, MAX_CHANNELS> = Adapter::parked();
+pub(crate) const PARKED: Adapter<'static, MAX_CHANNELS, MAX_CHANNELS, MAX_CHANNELS> = Adapter::empty();
 
 impl Stage {
     /// Whether these are the counts of desired, measured and reference channels; `None` is not asked.

@@ -1,4 +1,4 @@
-//! The flight stack with its settings.
+//! The flight stack.
 //!
 //! *in* states, setpoints, a model; *out* motor commands; *never* other bits than those of the flight stack in Rust; *source*
 //! [`impromptu_flight::flight`].
@@ -9,7 +9,7 @@ use impromptu_firmware::{
     network::Scratch,
 };
 use impromptu_flight::{
-    flight::{Flight, Settings},
+    flight::Flight,
     types::{MotorCommand, Tick},
 };
 
@@ -18,11 +18,10 @@ use crate::{
     values::{Command, Report, Setpoint, State},
 };
 
-/// A flight stack and the settings that a model must fit.
+/// A flight stack.
 #[derive(Debug)]
 pub struct Stack {
     pub(crate) flight: Flight<'static>,
-    pub(crate) settings: Settings,
 }
 
 impl Stack {
@@ -31,7 +30,7 @@ impl Stack {
     /// # Errors
     /// If the model does not fit; the loop then stays as it was.
     pub fn attach(&mut self, model: &'static Model<'static>, lanes: Lanes) -> Result<(), Status> {
-        Ok(self.flight.attach(model, &self.settings, lanes)?)
+        Ok(self.flight.attach(model, lanes)?)
     }
 
     /// Appends the desired state of the next reference tick.

@@ -22,11 +22,12 @@ use impromptu_firmware::{
 use nalgebra::{Quaternion, UnitQuaternion, Vector4};
 
 use crate::{
-    flight::{Flight, PREVIEW, Rates, Settings},
+    flight::{Flight, PREVIEW},
     link::{
         Command, Order, Outcome, Reason, Received,
         message::{FrameReport, Identity, LaneReport, Motors, Telemetry, TimedSetpoint},
     },
+    settings::{Rates, Settings},
     types::{MotorCommand, Reference, Setpoint, State, Tick},
 };
 
@@ -88,7 +89,7 @@ impl<'m> Autopilot<'m> {
     /// A vehicle that knows nothing of itself: it cannot be armed. 13 KB, so a microcontroller has it in a static.
     pub const fn new() -> Self {
         Self {
-            flight: Flight::parked(),
+            flight: Flight::empty(),
             rates: None,
             model: None,
             slot: None,
@@ -105,17 +106,17 @@ impl<'m> Autopilot<'m> {
         }
     }
 
-    /// Gives the vehicle the model that it shall fly with.
+    /// Gives the vehicle the model that it shall fly with; without settings it waits for them.
     ///
     /// # Errors
     /// If it does not fit the flight stack; then there is none.
     pub fn load(&mut self, model: &'m Model<'m>, slot: Option<u8>) -> Result<(), Refusal> {
-        self.model = None;
-        match &self.rates {
-            Some(rates) => self.flight.engage(model, rates, Lanes::NONE)?,
-            None => self.flight.hold(model),
+        (self.model, self.slot) = (None, slot);
+        self.flight.detach();
+        if self.rates.is_some() {
+            self.flight.attach(model, Lanes::NONE)?;
         }
-        (self.model, self.slot) = (Some(model), slot);
+        self.model = Some(model);
         Ok(())
     }
 
@@ -132,8 +133,10 @@ impl<'m> Autopilot<'m> {
         }
         (self.rates, self.news, self.state) = (Some(settings.rates), News::new(&settings.rates), State::ORIGIN);
         match self.model {
-            Some(model) => Flight::accepts(model, &settings.rates).map_err(|refusal| Reason::Model((&refusal).into())),
-            None => Ok(()),
+            Some(model) if self.flight.adapter().is_none() => {
+                self.flight.attach(model, Lanes::NONE).map_err(|refusal| Reason::Model((&refusal).into()))
+            }
+            _ => Ok(()),
         }
     }
 
@@ -303,7 +306,7 @@ impl<'m> Autopilot<'m> {
         if let Some(rates) = &self.rates {
             self.news = News::new(rates);
         }
-        self.flight.land();
+        self.flight.reset();
     }
 
     /// Appends a sample of the desired trajectory, and what was lost before it.
@@ -321,7 +324,7 @@ impl<'m> Autopilot<'m> {
         }
         if gap >= PREVIEW as i32 {
             // Nothing came for so long that the trajectory begins anew.
-            self.flight.restart_setpoints(timed.tick);
+            self.flight.clear_setpoints(timed.tick);
         }
         let gap = if gap < PREVIEW as i32 { gap } else { 0 };
         let start = self.setpoint;

@@ -7,60 +7,22 @@ use core::num::NonZeroU32;
 
 use impromptu_firmware::{
     adapter::{Adapter, Inference, Job, Lanes},
-    model::{Model, Refusal},
+    model::{MAX_AXES, Model, Refusal},
     network::Scratch,
     preview::{EndRule, Preview},
 };
 use nalgebra::{Matrix3, Vector3};
-use serde::{Deserialize, Serialize};
 
 use crate::{
-    control::{Airframe, AttitudeGains, AttitudeLoop, Mixer, PositionGains, PositionLoop, ThrustVector},
+    control::{AttitudeLoop, Mixer, PositionLoop, ThrustVector},
     quadrotor::{self, DESIRED, MEASURED, REFERENCE},
     types::{MotorCommand, Reference, Setpoint, State, Tick},
 };
 
+pub use crate::settings::{Rates, Settings};
+
 /// Samples of the desired trajectory that the flight stack keeps: 1.92 s at 100 Hz.
 pub const PREVIEW: usize = 192;
-
-/// Commands of the position loop that can be on their way to the attitude loop: 160 ms at 100 Hz.
-const COMMANDS: usize = 16;
-
-/// Rates of the loops.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Rates {
-    /// Control ticks (attitude loop) a second.
-    pub control_hz: f32,
-    /// Control ticks in a tick of the position loop, which is the reference's tick.
-    pub position_divisor: u32,
-}
-
-impl Default for Rates {
-    /// 500 Hz and 100 Hz, as the Crazyflie's firmware runs its attitude and position loops.
-    fn default() -> Self {
-        Self { control_hz: 500.0, position_divisor: 5 }
-    }
-}
-
-impl Rates {
-    /// Rate of the position loop and so of the reference, Hz.
-    pub fn reference_hz(&self) -> f32 {
-        self.control_hz / self.position_divisor.max(1) as f32
-    }
-}
-
-/// Settings of the flight stack.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Settings {
-    /// Vehicle constants.
-    pub airframe: Airframe,
-    /// Position loop.
-    pub position: PositionGains,
-    /// Attitude loop.
-    pub attitude: AttitudeGains,
-    /// Rates.
-    pub rates: Rates,
-}
 
 /// The adapter of the flight stack.
 pub type QuadrotorAdapter<'m> = Adapter<'m, DESIRED, MEASURED, REFERENCE>;
@@ -68,6 +30,7 @@ pub type QuadrotorAdapter<'m> = Adapter<'m, DESIRED, MEASURED, REFERENCE>;
 /// The loops of a vehicle.
 #[derive(Debug)]
 struct Loops {
+    rates: Rates,
     position_divisor: NonZeroU32,
     position: PositionLoop,
     attitude: AttitudeLoop,
@@ -78,6 +41,7 @@ impl Loops {
     /// `None` if the airframe cannot be mixed.
     fn new(settings: &Settings) -> Option<Self> {
         Some(Self {
+            rates: settings.rates,
             position_divisor: NonZeroU32::new(settings.rates.position_divisor).unwrap_or(NonZeroU32::MIN),
             position: PositionLoop::new(settings.position, settings.airframe.mass, settings.rates.reference_hz()),
             attitude: AttitudeLoop::new(settings.attitude, settings.airframe.inertia),
@@ -86,99 +50,120 @@ impl Loops {
     }
 }
 
-/// The baseline loop with, if a model is given, the add-on before it.
+/// What is configured and attached. The adapter has a model exactly if this is [`Stage::Adapted`], and a model that fits these loops.
+#[derive(Debug)]
+enum Stage {
+    /// Nothing is known of a vehicle: its motors are off.
+    Empty,
+    /// The loops alone.
+    Baseline(Loops),
+    /// The loops with the add-on before them.
+    Adapted(Loops),
+}
+
+impl Stage {
+    fn loops(&self) -> Option<&Loops> {
+        match self {
+            Self::Empty => None,
+            Self::Baseline(loops) | Self::Adapted(loops) => Some(loops),
+        }
+    }
+
+    fn loops_mut(&mut self) -> Option<&mut Loops> {
+        match self {
+            Self::Empty => None,
+            Self::Baseline(loops) | Self::Adapted(loops) => Some(loops),
+        }
+    }
+}
+
+/// The baseline loop with, if a model is attached, the add-on before it.
 #[derive(Debug)]
 pub struct Flight<'m> {
-    loops: Option<Loops>,
+    stage: Stage,
     preview: Preview<DESIRED, PREVIEW>,
     adapter: QuadrotorAdapter<'m>,
-    /// Whether its model is for these settings.
-    fits: bool,
     wanted: ThrustVector,
     reference: Reference,
     excitation: Vector3<f32>,
-    command_delay: u32,
-    on_the_way: heapless::Deque<(u32, ThrustVector), COMMANDS>,
 }
 
 impl<'m> Flight<'m> {
-    /// A flight stack that knows no vehicle: its motors are off. It is 12 KB large, so a microcontroller has it in a static.
-    pub const fn parked() -> Self {
+    /// A flight stack that knows no vehicle: its motors are off. It is 12 KB large and all zeros, so a microcontroller has it in a static
+    /// and [configures](Flight::configure) it there.
+    pub const fn empty() -> Self {
         Self {
-            loops: None,
+            stage: Stage::Empty,
             preview: Preview::new([EndRule::Hold; DESIRED], 0),
-            adapter: QuadrotorAdapter::parked(),
-            fits: false,
+            adapter: QuadrotorAdapter::empty(),
             wanted: ThrustVector {
                 force: Vector3::new(0.0, 0.0, 0.0),
                 attitude: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
             },
             reference: Reference::ORIGIN,
             excitation: Vector3::new(0.0, 0.0, 0.0),
-            command_delay: 0,
-            on_the_way: heapless::Deque::new(),
         }
     }
 
     /// A flight stack on the ground; `None` if the airframe cannot be mixed. The first setpoint is that of reference tick 0.
     pub fn new(settings: &Settings) -> Option<Self> {
-        let mut flight = Self::parked();
+        let mut flight = Self::empty();
         flight.configure(settings).then_some(flight)
     }
 
     /// Back on the ground with these settings; `false`, and nothing changes, if the airframe cannot be mixed. An add-on stays, as it was when
-    /// it was attached but with its lanes off, if its model is for these settings.
+    /// it was attached but with its lanes off, if its model is for these settings; else it is detached.
     pub fn configure(&mut self, settings: &Settings) -> bool {
         let Some(loops) = Loops::new(settings) else { return false };
-        self.loops = Some(loops);
-        self.rest();
-        self.adapter.restart();
-        self.fits = self.adapter.model().is_some_and(|model| Self::accepts(model, &settings.rates).is_ok());
+        if self.adapter.model().is_some_and(|model| Self::accepts(model, &settings.rates).is_ok()) {
+            self.stage = Stage::Adapted(loops);
+            self.adapter.restart();
+        } else {
+            self.stage = Stage::Baseline(loops);
+            self.adapter.unload();
+        }
+        self.reset();
         true
     }
 
     /// Back on the ground: the next setpoint is that of reference tick 0, and nothing is left of the last flight but the lanes that are
     /// wanted and the counts.
-    pub fn land(&mut self) {
-        if let Some(loops) = &mut self.loops {
+    pub fn reset(&mut self) {
+        if let Some(loops) = self.stage.loops_mut() {
             loops.position.reset();
         }
-        self.rest();
-    }
-
-    /// Nothing is left of a flight but the integral of the position loop.
-    fn rest(&mut self) {
         self.preview.restart(quadrotor::END_RULES, 0);
         self.adapter.reset();
         (self.wanted, self.reference, self.excitation) = (ThrustVector::NONE, Reference::ORIGIN, Vector3::zeros());
-        self.on_the_way.clear();
     }
 
-    /// Puts an add-on before the loop, with the lanes given.
+    /// Puts an add-on before the configured loops, with the lanes given, in the place of the one that was there.
     ///
     /// # Errors
-    /// If the model is for other signals, another rate, or a longer preview.
-    pub fn attach(&mut self, model: &'m Model<'m>, settings: &Settings, lanes: Lanes) -> Result<(), Refusal> {
-        self.engage(model, &settings.rates, lanes)
-    }
-
-    /// [`Flight::attach`], for which these settings are enough.
-    pub(crate) fn engage(&mut self, model: &'m Model<'m>, rates: &Rates, lanes: Lanes) -> Result<(), Refusal> {
-        Self::accepts(model, rates)?;
-        self.hold(model);
+    /// If the model is for other signals, another rate, or a longer preview; what was attached then stays. A flight stack without settings
+    /// has a rate of 0.
+    pub fn attach(&mut self, model: &'m Model<'m>, lanes: Lanes) -> Result<(), Refusal> {
+        Self::accepts(model, &self.stage.loops().map_or(Rates::NONE, |loops| loops.rates))?;
+        self.adapter.load(model, &quadrotor::signals());
+        self.adapter.defer();
         self.adapter.switch(lanes);
-        self.fits = true;
+        self.stage = match core::mem::replace(&mut self.stage, Stage::Empty) {
+            Stage::Empty => Stage::Empty,
+            Stage::Baseline(loops) | Stage::Adapted(loops) => Stage::Adapted(loops),
+        };
         Ok(())
     }
 
-    /// Has a model ready for settings which it is for ([`Flight::configure`]).
-    pub(crate) fn hold(&mut self, model: &'m Model<'m>) {
-        self.adapter.tie(model, &quadrotor::signals());
-        self.adapter.defer();
-        self.fits = false;
+    /// Takes the add-on away: the loops fly alone.
+    pub fn detach(&mut self) {
+        self.adapter.unload();
+        self.stage = match core::mem::replace(&mut self.stage, Stage::Empty) {
+            Stage::Empty => Stage::Empty,
+            Stage::Baseline(loops) | Stage::Adapted(loops) => Stage::Baseline(loops),
+        };
     }
 
-    /// Whether [`Flight::attach`] takes a model.
+    /// Whether [`Flight::attach`] takes a model, once configured with these rates.
     ///
     /// # Errors
     /// As [`Flight::attach`].
@@ -189,7 +174,10 @@ impl<'m> Flight<'m> {
 
     /// The add-on, if there is one.
     pub fn adapter(&mut self) -> Option<&mut QuadrotorAdapter<'m>> {
-        self.fits.then_some(&mut self.adapter)
+        match self.stage {
+            Stage::Adapted(_) => Some(&mut self.adapter),
+            Stage::Empty | Stage::Baseline(_) => None,
+        }
     }
 
     /// Appends the desired state of the next reference tick.
@@ -208,13 +196,13 @@ impl<'m> Flight<'m> {
     }
 
     /// Forgets the desired trajectory: the next setpoint is that of this reference tick.
-    pub fn restart_setpoints(&mut self, tick: i32) {
+    pub fn clear_setpoints(&mut self, tick: i32) {
         self.preview.clear(tick);
     }
 
     /// Reference tick of a control tick.
     pub fn reference_tick(&self, tick: Tick) -> i32 {
-        let divisor = self.loops.as_ref().map_or(NonZeroU32::MIN, |loops| loops.position_divisor);
+        let divisor = self.stage.loops().map_or(NonZeroU32::MIN, |loops| loops.position_divisor);
         (tick.0 / divisor) as i32
     }
 
@@ -228,12 +216,6 @@ impl<'m> Flight<'m> {
     /// the closed loop cannot be identified. Zero leaves every bit as it is.
     pub fn excite(&mut self, offset: Vector3<f32>) {
         self.excitation = offset;
-    }
-
-    /// Delays the position loop's command on its way to the attitude loop by this many control ticks (0 in flight): the link of
-    /// a position loop off board, or a robustness test. What does not fit into the queue is applied at once.
-    pub fn set_command_delay(&mut self, ticks: u32) {
-        self.command_delay = ticks;
     }
 
     /// One control tick, the network included.
@@ -257,28 +239,46 @@ impl<'m> Flight<'m> {
 
     /// [`Flight::control`] that puts the job, if there is one, where the caller has room for it: `true`.
     pub fn control_into(&mut self, tick: Tick, state: &State, job: &mut Job) -> (MotorCommand, bool) {
-        let mut released = false;
-        let Some(loops) = &mut self.loops else { return (MotorCommand::OFF, released) };
-        if tick.0.is_multiple_of(loops.position_divisor.get()) {
-            let reference_tick = (tick.0 / loops.position_divisor) as i32;
-            (self.reference, released) =
-                adapted(&self.preview, self.fits.then_some(&mut self.adapter), reference_tick, state, job);
-            if self.excitation != Vector3::zeros() {
-                self.reference.position += self.excitation;
-            }
-            let wanted = loops.position.step(&self.reference, state);
-            if tick.0 == 0 {
-                self.wanted = wanted;
-            }
-            if let Err((_, wanted)) = self.on_the_way.push_back((tick.0.wrapping_add(self.command_delay), wanted)) {
-                self.wanted = wanted;
-            }
-        }
-        while let Some((_, wanted)) = self.on_the_way.pop_front_if(|(due, _)| *due <= tick.0) {
+        let (wanted, released) = self.position_step(tick, state, job, |_| ());
+        if let Some(wanted) = wanted {
             self.wanted = wanted;
         }
-        let (thrust, moment) = loops.attitude.step(&self.wanted, state);
-        (loops.mixer.mix(thrust, &moment), released)
+        (self.attitude_step(&self.wanted, state), released)
+    }
+
+    /// The first half of a control tick: at a reference tick what the position loop wants of the attitude loop, and whether `job` was
+    /// written. In flight [`Flight::control`] hands the one to the other at once; a simulator puts here what it wants to know the
+    /// effect of: a command that is late, or, in `path`, a feedback lane of which the loop gets more or less than the lane knows
+    /// ([`Adapter::finish_through`]).
+    pub fn position_step(
+        &mut self,
+        tick: Tick,
+        state: &State,
+        job: &mut Job,
+        path: impl FnOnce(&mut [f32; MAX_AXES]),
+    ) -> (Option<ThrustVector>, bool) {
+        let (loops, adapter) = match &mut self.stage {
+            Stage::Empty => return (None, false),
+            Stage::Baseline(loops) => (loops, None),
+            Stage::Adapted(loops) => (loops, Some(&mut self.adapter)),
+        };
+        if !tick.0.is_multiple_of(loops.position_divisor.get()) {
+            return (None, false);
+        }
+        let reference_tick = (tick.0 / loops.position_divisor) as i32;
+        let (reference, released) = adapted(&self.preview, adapter, reference_tick, state, job, path);
+        self.reference = reference;
+        if self.excitation != Vector3::zeros() {
+            self.reference.position += self.excitation;
+        }
+        (Some(loops.position.step(&self.reference, state)), released)
+    }
+
+    /// The second half of a control tick: what the motors get for what the position loop wants.
+    pub fn attitude_step(&self, wanted: &ThrustVector, state: &State) -> MotorCommand {
+        let Some(loops) = self.stage.loops() else { return MotorCommand::OFF };
+        let (thrust, moment) = loops.attitude.step(wanted, state);
+        loops.mixer.mix(thrust, &moment)
     }
 
     /// Takes what came of a job of [`Flight::control`].
@@ -294,6 +294,7 @@ fn adapted(
     tick: i32,
     state: &State,
     job: &mut Job,
+    path: impl FnOnce(&mut [f32; MAX_AXES]),
 ) -> (Reference, bool) {
     let desired = preview.sample(tick);
     let yaw = desired[9];
@@ -301,7 +302,7 @@ fn adapted(
         Some(adapter) => {
             let measured = quadrotor::measured(state);
             let released = adapter.begin_into(tick, preview, &measured, job);
-            (quadrotor::reference(&adapter.finish(tick, preview, &measured), yaw), released)
+            (quadrotor::reference(&adapter.finish_through(tick, preview, &measured, path), yaw), released)
         }
         None => {
             let [px, py, pz, vx, vy, vz, ..] = desired;

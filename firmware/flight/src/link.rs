@@ -31,9 +31,8 @@ mod frozen;
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 
-pub use check::Message;
 pub use counts::{Counts, Fault};
-pub use message::{Command, Commands, Direction, Report, Reports};
+pub use message::{Command, Commands, Direction, Message, Report, Reports};
 pub use outcome::{ModelFault, Outcome, Reason};
 pub use port::{SendError, receive, send};
 pub use receiver::{Order, RECENT, Received, Receiver};

@@ -27,7 +27,7 @@ mod recorder;
 use core::fmt;
 
 use crate::{
-    flight::Settings,
+    settings::Settings,
     types::{MotorCommand, Reference},
 };
 

@@ -4,9 +4,9 @@
 //! limit, nor more than its slew from one tick to the next; *source* ours.
 
 use crate::{
-    guard::Shares,
+    format::{Card, MAX_AXES, MAX_OUTPUTS},
+    guard::{Outcome, Shares},
     math::clamp,
-    model::{Card, MAX_AXES, MAX_OUTPUTS},
 };
 
 /// What the lanes want of a reference tick.
@@ -18,19 +18,6 @@ pub(super) struct Wanted {
     /// How far the lanes are faded in, 0..=1.
     pub(super) network_weight: f32,
     pub(super) feedback_weight: f32,
-    /// Factor on the feedback lane's part, unknown to the lane.
-    pub(super) loop_gain: f32,
-}
-
-/// What came of it.
-#[derive(Default)]
-pub(super) struct Applied {
-    /// What each axis of the feedback lane has got.
-    pub(super) feedback: [f32; MAX_AXES],
-    /// What each lane has of the correction.
-    pub(super) shares: Shares,
-    /// Whether the network and the feedback lane asked for more than the bounds let pass.
-    pub(super) excess: [bool; 2],
 }
 
 /// The correction of the last tick.
@@ -49,17 +36,27 @@ impl Correction {
         self.values.iter().any(|value| *value != 0.0)
     }
 
-    /// Adds the lanes to `reference`, within limits and slew.
-    pub(super) fn apply(&mut self, card: &Card<'_>, wanted: &Wanted, reference: &mut [f32]) -> Applied {
+    /// Adds the lanes to `reference`, within limits and slew; the feedback lane's part by way of `path`. Returns what each axis of the
+    /// feedback lane has got, in the outputs' units.
+    pub(super) fn apply(
+        &mut self,
+        card: &Card<'_>,
+        wanted: &Wanted,
+        path: impl FnOnce(&mut [f32; MAX_AXES]),
+        reference: &mut [f32],
+        outcome: &mut Outcome,
+    ) -> [f32; MAX_AXES] {
+        let mut asked = wanted.feedback.map(|value| value * wanted.feedback_weight);
+        path(&mut asked);
         let mut feedback = [None; MAX_OUTPUTS];
         let axes = card.lane.iter().flat_map(|lane| &lane.axes);
-        for (axis, value) in axes.clone().zip(wanted.feedback) {
+        for (axis, value) in axes.clone().zip(asked) {
             if let Some(place) = feedback.get_mut(usize::from(axis.output)) {
-                *place = Some(value * wanted.feedback_weight * wanted.loop_gain);
+                *place = Some(value);
             }
         }
-        let mut applied = Applied { shares: self.shadow(card, &wanted.network), ..Applied::default() };
-        let shares = &mut applied.shares;
+        shadow(card, &wanted.network, outcome);
+        let Outcome { shares, excess, .. } = outcome;
         let mut lost = [0.0; MAX_OUTPUTS];
         let parts = shares.network.iter_mut().zip(&mut shares.feedback).zip(&mut lost);
         let lanes = wanted.network.iter().zip(&feedback);
@@ -83,28 +80,29 @@ impl Correction {
                 saturated = true;
                 // A limit of zero switches the output off.
                 let asks = |part: f32| output.limit > 0.0 && part * *lost < 0.0;
-                applied.excess = [applied.excess[0] | asks(network), applied.excess[1] | asks(feedback.unwrap_or(0.0))];
+                *excess = [excess[0] | asks(network), excess[1] | asks(feedback.unwrap_or(0.0))];
             }
         }
         self.saturations = self.saturations.saturating_add(u32::from(saturated));
-        for ((axis, value), got) in axes.zip(wanted.feedback).zip(&mut applied.feedback) {
+        let mut applied = [0.0; MAX_AXES];
+        for ((axis, value), got) in axes.zip(wanted.feedback).zip(&mut applied) {
             *got = value * wanted.feedback_weight + lost.get(usize::from(axis.output)).copied().unwrap_or(0.0);
         }
         applied
     }
 
     /// No correction; not even an addition of zero: the baseline's bits.
-    pub(super) fn clear(&mut self, card: &Card<'_>, wanted: &Wanted) -> Applied {
+    pub(super) fn clear(&mut self, card: &Card<'_>, wanted: &Wanted, outcome: &mut Outcome) -> [f32; MAX_AXES] {
         self.values = [0.0; MAX_OUTPUTS];
-        Applied { shares: self.shadow(card, &wanted.network), ..Applied::default() }
+        shadow(card, &wanted.network, outcome);
+        [0.0; MAX_AXES]
     }
+}
 
-    /// What the network lane would do alone.
-    fn shadow(&self, card: &Card<'_>, network: &[f32; MAX_OUTPUTS]) -> Shares {
-        let mut shares = Shares::default();
-        for ((alone, network), output) in shares.alone.iter_mut().zip(network).zip(&card.outputs) {
-            *alone = clamp(*network, -output.limit, output.limit);
-        }
-        shares
+/// An outcome in which nothing was applied, with what the network lane would do alone.
+fn shadow(card: &Card<'_>, network: &[f32; MAX_OUTPUTS], outcome: &mut Outcome) {
+    (outcome.shares, outcome.excess) = (Shares::NONE, [false; 2]);
+    for ((alone, network), output) in outcome.shares.alone.iter_mut().zip(network).zip(&card.outputs) {
+        *alone = clamp(*network, -output.limit, output.limit);
     }
 }

@@ -6,7 +6,8 @@
 use super::signals::matched_error;
 use crate::{
     feedback::AxisState,
-    model::{MAX_AXES, MAX_ERRORS, Model},
+    format::{MAX_AXES, MAX_ERRORS},
+    model::Model,
     preview::Preview,
 };
 
@@ -20,7 +21,7 @@ pub(super) type Errors = [[f32; MAX_ERRORS]; MAX_AXES];
 #[derive(Debug)]
 pub(super) struct Feedback {
     axes: [AxisState; MAX_AXES],
-    /// Recent peak of what is desired of the loop and of its errors ([`crate::model::Authority`]).
+    /// Recent peak of what is desired of the loop and of its errors ([`crate::format::Authority`]).
     vigour: f32,
 }
 

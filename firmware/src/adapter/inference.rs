@@ -4,8 +4,8 @@
 //! loop, so that a task of lower priority can do it; *source* ours.
 
 use crate::{
+    format::{MAX_FEATURES, MAX_OUTPUTS},
     math::finite_or_zero,
-    model::{MAX_FEATURES, MAX_OUTPUTS},
     network::{Network, Scratch},
 };
 

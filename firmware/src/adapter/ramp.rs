@@ -4,7 +4,7 @@
 //! step when an inference is late: the correction stays where it is; *source* ours, for Zhou 2017's sub-rate.
 
 use super::Inference;
-use crate::model::{Interpolation, MAX_OUTPUTS};
+use crate::format::{Interpolation, MAX_OUTPUTS};
 
 /// The correction between two sub-rate ticks.
 #[derive(Clone, Debug)]

@@ -1,15 +1,13 @@
 //! What an adapter reads: the application's channels, matched by name with the model's, and their past at the sub-rate.
 //!
 //! *in* signal tables, previews and histories; *out* what features ask for; *never* a model between other channels than the
-//! application's; *source* the signal tables of [`crate::model`].
+//! application's; *source* the signal tables of [`crate::format`].
 
 use crate::{
     features::Signals,
-    model::{Card, Channels, Refusal},
+    format::{Card, Channels, HISTORY, Refusal},
     preview::Preview,
 };
-
-use super::HISTORY;
 
 /// Values at sub-rate ticks; what is older or newer than stored gives the nearest.
 pub(super) type History<const C: usize> = Preview<C, HISTORY>;

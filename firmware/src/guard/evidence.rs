@@ -8,25 +8,14 @@
 //! measured, or hardly, while the feedback lane would also answer to the network's mistakes: so the network is judged on what it would do
 //! alone and in full, against no add-on at all, also while it is faded out: it comes back when it would do good.
 
-use super::{GuardSettings, Monitor, watch::leak};
+use super::{GuardSettings, Monitor, observation::Shares, watch::leak};
 use crate::{
+    format::{Floats, MAX_AXES, MAX_INPUTS, MAX_OUTPUTS, MAX_TAPS},
     math::{clamp, finite_or_zero},
-    model::{Floats, MAX_AXES, MAX_INPUTS, MAX_OUTPUTS, MAX_TAPS},
 };
 
 /// Bound of the errors that are believed.
 const LARGEST: f32 = 1e9;
-
-/// What the lanes contributed to the correction of each output in a reference tick. The first two add up to the correction.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Shares {
-    /// The network lane's part.
-    pub(crate) network: [f32; MAX_OUTPUTS],
-    /// The feedback lane's part.
-    pub(crate) feedback: [f32; MAX_OUTPUTS],
-    /// What the network lane would contribute alone and in full, within the limits.
-    pub(crate) alone: [f32; MAX_OUTPUTS],
-}
 
 /// One contribution over the last monitor ticks.
 #[derive(Clone, Copy, Debug)]
@@ -119,7 +108,7 @@ impl Evidence {
     }
 
     /// Forgets everything: no lane has acted for long, or ticks are missing.
-    pub(crate) fn restart(&mut self) {
+    pub(super) fn reset(&mut self) {
         if !self.busy {
             return;
         }

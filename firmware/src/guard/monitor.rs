@@ -1,8 +1,8 @@
-//! The loop's response to corrections, checked: what [`crate::model::MonitorLayout`] points to.
+//! The loop's response to corrections, checked: what [`crate::format::MonitorLayout`] points to.
 
 use heapless::Vec;
 
-use crate::model::{Blob, Floats, MAX_AXES, MonitorAxis, MonitorLayout, Refusal};
+use crate::format::{Blob, Floats, MAX_AXES, MonitorAxis, MonitorLayout, Refusal};
 
 /// A checked monitor.
 #[derive(Debug)]

@@ -8,7 +8,7 @@
 //! is none. Noise brings turns about too, but not as many, and not with the power of a lane that is hardly ever between its clamps.
 
 use super::{GuardSettings, watch::leak};
-use crate::model::{LaneLayout, MAX_AXES};
+use crate::format::{LaneLayout, MAX_AXES};
 
 /// One axis.
 #[derive(Clone, Copy, Debug)]

@@ -1,9 +1,11 @@
 //! Checks of a decoded card: every index exists, every number makes sense, every probe gives its bits.
 
-use super::{Blob, Bounds, Card, Floats, LaneLayout, MAX_LAGS, MAX_TAPS, MAX_WIDTH, MonitorLayout, Refusal};
 use crate::{
-    features::{Relative, Source},
     feedback::{self, Lane},
+    format::{
+        Blob, Bounds, Card, Floats, HISTORY, LaneLayout, MAX_ERRORS, MAX_FEATURES, MAX_LAGS, MAX_OUTPUTS, MAX_TAPS, MAX_WIDTH,
+        MonitorLayout, Refusal, Relative, Source,
+    },
     network::{Network, Scratch},
 };
 
@@ -21,7 +23,7 @@ pub(super) fn card(card: &Card<'_>) -> Result<(), Refusal> {
     outputs(card)?;
     if let Some(network) = &card.network {
         if card.features.is_empty() {
-            return Err(Refusal::Shape { what: "number of features", found: 0, limit: super::MAX_FEATURES as u32 });
+            return Err(Refusal::Shape { what: "number of features", found: 0, limit: MAX_FEATURES as u32 });
         }
         for layer in &network.layers {
             for (what, width) in [("layer inputs", layer.inputs), ("layer outputs", layer.outputs)] {
@@ -81,7 +83,7 @@ fn features(card: &Card<'_>) -> Result<(), Refusal> {
             Source::Reference => -1,
             _ => 0,
         };
-        let history = -(crate::adapter::HISTORY as i16) + 2;
+        let history = -(HISTORY as i16) + 2;
         let beyond = !future && (feature.offset > newest || feature.offset < history);
         if ticks.abs() > MAX_OFFSET_TICKS || beyond {
             return Err(Refusal::Value { what: "feature offset" });
@@ -136,7 +138,7 @@ fn lane(card: &Card<'_>, lane: &LaneLayout) -> Result<(), Refusal> {
             return Err(Refusal::Duplicate { what: "lane output", found });
         }
         if axis.errors.is_empty() {
-            return Err(Refusal::Shape { what: "lane errors", found: 0, limit: super::MAX_ERRORS as u32 });
+            return Err(Refusal::Shape { what: "lane errors", found: 0, limit: MAX_ERRORS as u32 });
         }
         for &(measured, desired) in &axis.errors {
             if usize::from(measured) >= card.signals.measured.len() {
@@ -200,7 +202,7 @@ pub(super) fn network_probes<'a>(
     let stored = blob.floats(card.probes.network, count * (inputs + outputs), "network probes")?;
     let (probe_inputs, probe_outputs) = stored.split_at(count * inputs);
     let Some((network, envelope, bounds)) = network else { return Ok(()) };
-    let (mut x, mut y) = ([0.0; super::MAX_FEATURES], [0.0; super::MAX_OUTPUTS]);
+    let (mut x, mut y) = ([0.0; MAX_FEATURES], [0.0; MAX_OUTPUTS]);
     for probe in 0..count {
         for (i, value) in x.iter_mut().enumerate().take(inputs) {
             *value = probe_inputs.get(probe * inputs + i);

@@ -1,7 +1,7 @@
 //! Dense layers in f32.
 
-use super::{Activation, ROWS, kernel};
-use crate::model::{Blob, LayerLayout, Refusal, Section};
+use super::{kernel, shape::ROWS};
+use crate::format::{Activation, Blob, LayerLayout, Refusal, Section};
 
 /// Inputs are padded to a multiple of this.
 const PADDING: usize = 2;

@@ -5,11 +5,10 @@
 //! it into a code with one rounded multiplication, (accumulator × multiplier + 2³¹) / 2³²; the last one into f32 with a scale.
 
 use super::{
-    Activation, INPUT_PADDING, ROWS,
     kernel::{self, Finish, Width, portable},
-    padded,
+    shape::{INPUT_PADDING, ROWS, padded},
 };
-use crate::model::{Blob, Floats, LayerLayout, Refusal};
+use crate::format::{Activation, Blob, Floats, LayerLayout, Refusal};
 
 /// One checked layer.
 #[derive(Debug)]

@@ -8,7 +8,7 @@
 //! With n = (x − mean) · (1 / scale) in f32, and d(·) the dense layers,
 //! output = (skip(n) + d(n)) · output scale + output mean. Float layers follow the order of operations in [`kernel`]. Integer layers:
 //! 1. the inputs' codes are n · `input_code`, rounded to the nearest integer (halves to even), within ± the first layer's
-//!    [`input_limit`](crate::model::LayerLayout::input_limit);
+//!    [`input_limit`](crate::format::LayerLayout::input_limit);
 //! 2. a hidden layer's accumulator a, exact in 32 bits, becomes c = ⌊a · multiplier / 2³² + ½⌋. ReLU: c within 0..=L, L being the next
 //!    layer's limit. Linear: c within ±L. Tanh: c within 16 bits is a pre-activation in units of 1/[`TANH_INPUT_ONE`], [`tanh_code`]
 //!    makes a code of it, of which L is 1;
@@ -18,32 +18,16 @@ mod float;
 mod integer;
 pub mod kernel;
 mod scratch;
+mod shape;
 mod tanh;
 
-use serde::{Deserialize, Serialize};
+use crate::format::{Arithmetic, Blob, Floats, MAX_FEATURES, MAX_LAYERS, MAX_OUTPUTS, NetworkLayout, Refusal};
 
-use crate::model::{Arithmetic, Blob, Floats, MAX_FEATURES, MAX_LAYERS, MAX_OUTPUTS, NetworkLayout, Refusal};
-
+pub use crate::format::Activation;
 pub use kernel::portable::requantise;
 pub use scratch::{MAX_SCRATCH, Scratch};
+pub use shape::{INPUT_PADDING, ROWS, padded};
 pub use tanh::{TANH_CODE_ERROR, TANH_ERROR, TANH_INPUT_ONE, tanh, tanh_code};
-
-/// Outputs that are computed side by side.
-pub const ROWS: usize = 8;
-const _: () = assert!(MAX_OUTPUTS == ROWS);
-/// Inputs of an integer layer are padded to a multiple of this; of a float layer to a multiple of 2.
-pub const INPUT_PADDING: usize = 4;
-
-/// Non-linearity behind a dense layer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Activation {
-    /// The identity.
-    Linear,
-    /// max(0, x).
-    Relu,
-    /// Hyperbolic tangent.
-    Tanh,
-}
 
 #[derive(Debug)]
 enum Layers<'a> {
@@ -234,9 +218,4 @@ fn integer_layers<'a>(
         before = layer.activation;
     }
     Ok(())
-}
-
-/// Rows of a packed layer: outputs rounded up to whole blocks.
-pub fn padded(outputs: usize) -> usize {
-    outputs.next_multiple_of(ROWS)
 }

@@ -1,7 +1,7 @@
 //! Working memory of an evaluation.
 
-use super::{INPUT_PADDING, ROWS, padded};
-use crate::model::{Arithmetic, MAX_FEATURES, MAX_WIDTH, NetworkLayout};
+use super::shape::{INPUT_PADDING, ROWS, padded};
+use crate::format::{Arithmetic, MAX_FEATURES, MAX_WIDTH, NetworkLayout};
 
 /// Words that are enough for every network.
 pub const MAX_SCRATCH: usize = 2 * MAX_WIDTH;

@@ -4,7 +4,7 @@ use core::fmt;
 
 use embedded_storage::nor_flash::{NorFlashError, NorFlashErrorKind};
 
-use crate::model::Refusal;
+use crate::format::Refusal;
 
 /// What the flash was asked to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -92,6 +92,8 @@ pub enum StorageError {
     Layout {
         /// Layout version in the slot.
         found: u32,
+        /// Layout version that this build reads.
+        expected: u16,
     },
     /// The header announces more bytes than the slot has.
     Length {
@@ -145,8 +147,8 @@ impl fmt::Display for StorageError {
             Self::ReadBack => write!(f, "the slot's header is not what was written: upload the model again"),
             Self::Vacant => write!(f, "the slot holds no model: upload one"),
             Self::Torn => write!(f, "the slot's header is damaged (an interrupted upload): upload the model again"),
-            Self::Layout { found } => {
-                write!(f, "the slot has layout {found}, this build reads {}: upload the model again", super::VERSION)
+            Self::Layout { found, expected } => {
+                write!(f, "the slot has layout {found}, this build reads {expected}: upload the model again")
             }
             Self::Length { length } => {
                 write!(f, "the slot's header announces {length} bytes, more than the slot has: upload the model again")

@@ -10,14 +10,14 @@
 //! | 10..12 | zero |
 //! | 12..16 | sequence number, u32 |
 //! | 16..20 | length of the model file in bytes, u32 |
-//! | 20..24 | check sum of the model file ([`crate::model::file::checksum`]), u32 |
+//! | 20..24 | check sum of the model file ([`crate::format::file::checksum`]), u32 |
 //! | 24..28 | zero |
 //! | 28..32 | CRC-32 (ISO-HDLC) of the bytes before, u32 |
 //!
 //! All numbers are little-endian. The model file follows at once, so it lies on a boundary of 16 bytes if its slot does.
 
 use super::StorageError;
-use crate::model::file::CRC;
+use crate::format::file::CRC;
 
 /// First bytes of every slot that holds a model.
 pub const MAGIC: [u8; 8] = *b"IMPRSLOT";
@@ -88,7 +88,7 @@ impl Header {
             u32::from_le_bytes(word.copied().unwrap_or_default())
         });
         if version != u32::from(VERSION) || reserved != 0 {
-            return Err(StorageError::Layout { found: version });
+            return Err(StorageError::Layout { found: version, expected: VERSION });
         }
         Ok(Self { sequence: Sequence(sequence), length, checksum })
     }
@@ -114,7 +114,7 @@ mod tests {
         bytes[8] = 9;
         let crc = CRC.checksum(&bytes[..28]).to_le_bytes();
         bytes[28..].copy_from_slice(&crc);
-        assert_eq!(Header::from_bytes(&bytes), Err(StorageError::Layout { found: 9 }));
+        assert_eq!(Header::from_bytes(&bytes), Err(StorageError::Layout { found: 9, expected: VERSION }));
     }
 
     proptest! {

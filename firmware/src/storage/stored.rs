@@ -5,7 +5,8 @@
 
 use super::{HEADER, Header, Sequence, StorageError};
 use crate::{
-    model::{Model, Refusal, file},
+    format::{Refusal, file},
+    model::Model,
     network::Scratch,
 };
 

@@ -5,7 +5,8 @@
 
 use super::{HEADER, Header, Operation, Sequence, Slot, StorageError, Stored, stored::examine};
 use crate::{
-    model::{Model, Refusal, file},
+    format::{Refusal, file},
+    model::Model,
     network::Scratch,
 };
 

@@ -4,6 +4,7 @@
 //! or on the number of threads; *source* Zhou 2017, Fig. 1; rates of `impromptu_flight::flight::Rates`.
 
 mod conversion;
+mod faults;
 mod pilot;
 mod plan;
 mod stack;
@@ -18,6 +19,7 @@ use crate::{
     weather::Weather,
 };
 pub use conversion::{setpoint, settings};
+pub use faults::FaultyFlight;
 use pilot::Pilot;
 pub use plan::{Dither, FlightPlan, FlightRecord, RolloutError};
 pub use stack::FlightStack;

@@ -64,7 +64,7 @@ fn wrong_header_is_named() {
     };
     assert_eq!(refusal(&|bytes| bytes[0] = b'i'), Refusal::NotAModel);
     let version = refusal(&|bytes| bytes[8] = 1);
-    assert_eq!(version, Refusal::Version { found: 1 });
+    assert_eq!(version, Refusal::Version { found: 1, expected: file::VERSION });
     assert!(version.to_string().contains("format version 1, this build reads 2"));
     assert_eq!(refusal(&|bytes| bytes[30] = 1), Refusal::Value { what: "reserved part of the header" });
     let trailing = refusal(&|bytes| bytes.push(0));

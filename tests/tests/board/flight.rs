@@ -96,7 +96,7 @@ pub(crate) fn fly(addon: Option<(&Model<'_>, Lanes)>, ticks: u32, switches: impl
     let mut flight = Flight::new(&settings).unwrap();
     let mut scratch = Scratch::new();
     if let Some((model, lanes)) = addon {
-        flight.attach(model, &settings, lanes).unwrap();
+        flight.attach(model, lanes).unwrap();
     }
     let mut vehicle = Vehicle {
         position: setpoint(0).position.cast(),

@@ -74,7 +74,7 @@ unsafe fn fill(
     unsafe {
         let adapter = ptr::addr_of_mut!((*stage).adapter);
         adapter.write(PARKED);
-        (*adapter).tie(model, table);
+        (*adapter).load(model, table);
         let preview = ptr::addr_of_mut!((*stage).preview);
         preview.write(EMPTY);
         (*preview).restart(layout.rules, first_tick);

@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// All zeros, so that it is written in place.
-const PARKED: Flight<'static> = Flight::parked();
+const EMPTY: Flight<'static> = Flight::empty();
 
 /// Creates a flight stack in `flight`, which has `size` bytes, with no add-on. The first setpoint is that of reference tick 0.
 #[unsafe(no_mangle)]
@@ -27,9 +27,8 @@ pub unsafe extern "C" fn impromptu_flight_create(
     unsafe {
         create::<Stack>(flight, size, |stack| {
             let settings = input(settings)?.checked().ok_or(Status::Settings)?;
-            ptr::addr_of_mut!((*stack).settings).write(settings);
             let flight = ptr::addr_of_mut!((*stack).flight);
-            flight.write(PARKED);
+            flight.write(EMPTY);
             if (*flight).configure(&settings) { Ok(()) } else { Err(Status::Settings) }
         })
     }

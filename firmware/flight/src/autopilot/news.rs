@@ -3,7 +3,7 @@
 //! *in* the sender's ticks of what arrived, and control ticks; *out* when the add-on, and when the motors have to go off; *never* an older
 //! state for a newer one; *source* ours.
 
-use crate::flight::Rates;
+use crate::settings::Rates;
 
 /// How long the vehicle goes on with what it knows, s.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,34 +3,20 @@
 //! *in* a message; *out* the reason why it is refused, if it is; *never* a number that is not finite past here, or a change of one
 //! that is; *source* x86 and Arm give NaN other bits, so a NaN would end the equality of both.
 
-use serde::Serialize;
-
 use super::{
     CHUNK,
-    message::{Command, Inertial, ModelChunk, Motors, Position, Report, Telemetry, TimedSetpoint},
+    message::{Command, Inertial, Message, ModelChunk, Motors, Position, Report, Telemetry, TimedSetpoint},
     outcome::Reason,
 };
 use impromptu_firmware::math;
 
 use crate::{
     control::{Airframe, AttitudeGains, PositionGains},
-    flight::{Rates, Settings},
+    settings::{Rates, Settings},
 };
 
 /// How far from 1 the length of an attitude's quaternion may be.
 const LENGTH_TOLERANCE: f32 = 1e-3;
-
-/// A message of either direction.
-pub trait Message: Serialize {
-    /// Whether it may be delivered.
-    ///
-    /// # Errors
-    /// What is wrong with it.
-    fn check(&self) -> Result<(), Reason>;
-
-    /// Whether a conversation starts with it, so that sequence numbers count from here.
-    fn opens(&self) -> bool;
-}
 
 impl Message for Command<'_> {
     fn check(&self) -> Result<(), Reason> {

@@ -12,7 +12,7 @@ use impromptu_firmware::adapter::Lanes;
 
 use crate::{
     control::{Airframe, AttitudeGains, PositionGains},
-    flight::{Rates, Settings},
+    settings::{Rates, Settings},
 };
 
 /// Numbers that no two fields share.

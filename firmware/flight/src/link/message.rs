@@ -8,13 +8,25 @@ mod report;
 
 use serde::{Deserialize, Serialize};
 
-use super::{check::Message, outcome::Outcome};
+use super::outcome::{Outcome, Reason};
 use impromptu_firmware::adapter::Lanes;
 
-use crate::flight::Settings;
+use crate::settings::Settings;
 
 pub use command::{Inertial, ModelChunk, Position, TimedSetpoint};
 pub use report::{FlyingModel, FrameReport, Identity, LaneReport, Motors, TRIP_REASONS, Telemetry};
+
+/// A message of either direction.
+pub trait Message: Serialize {
+    /// Whether it may be delivered.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    fn check(&self) -> Result<(), Reason>;
+
+    /// Whether a conversation starts with it, so that sequence numbers count from here.
+    fn opens(&self) -> bool;
+}
 
 /// Which way messages go.
 pub trait Direction {

@@ -105,7 +105,7 @@ impl From<&Refusal> for ModelFault {
     fn from(refusal: &Refusal) -> Self {
         match *refusal {
             Refusal::TooShort { .. } | Refusal::NotAModel | Refusal::Length { .. } | Refusal::Checksum { .. } => Self::Damaged,
-            Refusal::Version { found } => Self::Version { found },
+            Refusal::Version { found, .. } => Self::Version { found },
             Refusal::Probe { index } => Self::Probe { index },
             Refusal::Signal { channel, .. } => Self::Signal { channel },
             Refusal::Preview { needed, .. } => Self::Preview { needed },

@@ -3,7 +3,7 @@
 //! *in* a message and a sequence number; *out* the frame's bytes, with the zero that ends it; *never* half a frame: what does not fit
 //! gives none; *source* COBS of Cheshire and Baker 1999 (`cobs`), postcard (`postcard`).
 
-use super::{BODY, CRC, PAYLOAD, VERSION, check::Message};
+use super::{BODY, CRC, PAYLOAD, VERSION, message::Message};
 
 /// Encodes a message; `None` if it does not fit into a payload, or the frame into the output ([`super::FRAME`] bytes are enough for any).
 pub fn encode<'o>(message: &impl Message, sequence: u8, output: &'o mut [u8]) -> Option<&'o [u8]> {

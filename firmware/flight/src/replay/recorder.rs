@@ -6,7 +6,7 @@ use super::{Event, Header, answer};
 use impromptu_firmware::{adapter::Lanes, model::Model};
 
 use crate::{
-    flight::Settings,
+    settings::Settings,
     types::{MotorCommand, Reference, Setpoint, State},
 };
 

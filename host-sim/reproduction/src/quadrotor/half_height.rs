@@ -14,7 +14,7 @@ use impromptu_flight::{
     quadrotor::{self, DESIRED, END_RULES},
     types::{MotorCommand, Reference, Setpoint, State, Tick},
 };
-use impromptu_sim::rollout::FlightStack;
+use impromptu_sim::rollout::{FaultyFlight, FlightStack};
 use nalgebra::Vector3;
 
 /// What the vertical reference is multiplied by.
@@ -22,7 +22,7 @@ pub const GAIN: f32 = 0.5;
 
 /// The stack.
 pub struct HalfHeight<'m> {
-    inside: Flight<'m>,
+    inside: FaultyFlight<'m>,
     preview: Preview<DESIRED, PREVIEW>,
     adapter: Option<QuadrotorAdapter<'m>>,
     scratch: Scratch,
@@ -44,10 +44,9 @@ impl<'m> HalfHeight<'m> {
                 Ok(adapter)
             })
             .transpose()?;
-        let Some(mut inside) = Flight::new(settings) else { return Ok(None) };
-        inside.set_command_delay(command_delay);
+        let Some(inside) = Flight::new(settings) else { return Ok(None) };
         Ok(Some(Self {
-            inside,
+            inside: FaultyFlight::new(inside, 1.0, command_delay),
             preview: Preview::new(END_RULES, 0),
             adapter,
             scratch: Scratch::new(),
@@ -79,7 +78,7 @@ impl FlightStack for HalfHeight<'_> {
             };
             self.reference = quadrotor::reference(&channels, desired[9]);
             let halved = |vector: &Vector3<f32>| Vector3::new(vector.x, vector.y, GAIN * vector.z);
-            self.inside.push_setpoint(&Setpoint {
+            self.inside.flight.push_setpoint(&Setpoint {
                 position: halved(&self.reference.position),
                 velocity: halved(&self.reference.velocity),
                 acceleration: Vector3::zeros(),

@@ -10,7 +10,10 @@ use impromptu_flight::{
 };
 use nalgebra::Vector3;
 
-use super::plan::{FlightPlan, RolloutError};
+use super::{
+    faults::FaultyFlight,
+    plan::{FlightPlan, RolloutError},
+};
 use crate::{condition::Condition, plant::Vehicle};
 
 /// A flight stack, on the ground or in flight.
@@ -57,7 +60,7 @@ impl<S: FlightStack> FlightStack for &mut S {
 
 /// The flight stack in this program.
 pub(super) struct Software<'a> {
-    flight: Flight<'a>,
+    inside: FaultyFlight<'a>,
     scratch: Scratch,
 }
 
@@ -70,39 +73,38 @@ impl<'a> Software<'a> {
     ) -> Result<Self, RolloutError> {
         let mut flight = Flight::new(settings).ok_or_else(|| RolloutError::Airframe(vehicle.name.clone()))?;
         if let Some((model, lanes)) = plan.model {
-            flight.attach(model, settings, lanes)?;
+            flight.attach(model, lanes)?;
             if let Some(adapter) = flight.adapter() {
-                adapter.set_loop_gain(plan.loop_gain);
                 adapter.set_guard(plan.guard);
             }
         }
-        flight.set_command_delay(condition.command_delay_ticks(settings.rates.control_hz.into()));
-        Ok(Self { flight, scratch: Scratch::new() })
+        let delay = condition.command_delay_ticks(settings.rates.control_hz.into());
+        Ok(Self { inside: FaultyFlight::new(flight, plan.loop_gain, delay), scratch: Scratch::new() })
     }
 }
 
 impl FlightStack for Software<'_> {
     fn push_setpoint(&mut self, setpoint: &Setpoint) {
-        self.flight.push_setpoint(setpoint);
+        self.inside.flight.push_setpoint(setpoint);
     }
 
     fn next_setpoint(&self) -> i32 {
-        self.flight.next_setpoint()
+        self.inside.flight.next_setpoint()
     }
 
     fn excite(&mut self, offset: Vector3<f32>) {
-        self.flight.excite(offset);
+        self.inside.flight.excite(offset);
     }
 
     fn step(&mut self, tick: Tick, state: &State) -> MotorCommand {
-        self.flight.step(tick, state, &mut self.scratch)
+        self.inside.step(tick, state, &mut self.scratch)
     }
 
     fn reference(&self) -> &Reference {
-        self.flight.reference()
+        self.inside.flight.reference()
     }
 
     fn trips(&mut self) -> Trips {
-        self.flight.adapter().map(|adapter| adapter.trips()).unwrap_or_default()
+        self.inside.flight.adapter().map(|adapter| adapter.trips()).unwrap_or_default()
     }
 }

@@ -135,7 +135,7 @@ fn start(
         let model = model
             .filter(|model| model.checksum() == wanted)
             .ok_or(ReplayError::OtherModel(wanted, model.map(Model::checksum)))?;
-        flight.attach(model, &settings, Lanes::NONE).map_err(ReplayError::Model)?;
+        flight.attach(model, Lanes::NONE).map_err(ReplayError::Model)?;
         clock.sub_rate = Some(clock.reference * u32::from(model.card().timing.divisor));
     }
     Ok((flight, clock))

@@ -3,27 +3,16 @@
 //! *in* the bytes of a model file; *out* a [`Model`] whose every index, shape and probe has been checked; *never* a panic on
 //! any bytes; *source* [`mod@file`] for the layout, [`Card`] for the fields.
 
-mod blob;
-mod bounds;
-mod card;
-mod counts;
-mod decode;
-pub mod file;
-mod place;
-mod refusal;
 mod validate;
-
-pub use blob::{Blob, Floats, Words};
-pub use bounds::{Bounds, OutputBounds, Reach};
-pub use card::*;
-pub use place::Place;
-pub use refusal::Refusal;
 
 use crate::{
     feedback::Lane,
+    format::decode,
     guard::Monitor,
     network::{Network, Scratch},
 };
+
+pub use crate::format::*;
 
 /// A model that passed every check.
 #[derive(Debug)]
@@ -142,11 +131,7 @@ impl<'a> Model<'a> {
 fn load_card<'a>(bytes: &'a [u8], card: &mut Card<'a>, blob: &mut Blob<'a>) -> Result<(), Refusal> {
     let (card_bytes, blob_bytes) = file::split(bytes)?;
     *blob = Blob::new(blob_bytes);
-    match decode::card(card_bytes, card) {
-        Some([]) => Ok(()),
-        Some(_) => Err(Refusal::Card),
-        None => Err(counts::refusal(card_bytes)),
-    }
+    if decode::card(card_bytes, card)?.is_empty() { Ok(()) } else { Err(Refusal::Card) }
 }
 
 #[inline(never)]

@@ -69,10 +69,10 @@ pub struct Bounds<'a>(Floats<'a>);
 
 impl<'a> Bounds<'a> {
     /// Of no outputs.
-    pub(super) const EMPTY: Self = Self(Floats::EMPTY);
+    pub(crate) const EMPTY: Self = Self(Floats::EMPTY);
 
     /// Checks the bounds against themselves and the limits.
-    pub(super) fn new(card: &Card<'a>, blob: &Blob<'a>) -> Result<Self, Refusal> {
+    pub(crate) fn new(card: &Card<'a>, blob: &Blob<'a>) -> Result<Self, Refusal> {
         let count = if card.network.is_some() { card.outputs.len() } else { 0 };
         let bounds = Self(blob.floats(card.bounds, FIELDS * count, "output bounds")?);
         for (index, (bounds, output)) in bounds.iter().zip(&card.outputs).enumerate() {
@@ -96,7 +96,7 @@ impl<'a> Bounds<'a> {
     }
 
     /// Refuses outputs that the bounds exclude for these features.
-    pub(super) fn check(
+    pub(crate) fn check(
         &self,
         inputs: &[f32; MAX_FEATURES],
         outputs: &[f32],

@@ -1,24 +1,6 @@
-//! The two lanes, on or off.
-
-use serde::{Deserialize, Serialize};
+//! How lanes come and go.
 
 use crate::math::clamp;
-
-/// Which lanes act.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Lanes {
-    /// The network lane.
-    pub network: bool,
-    /// The feedback lane.
-    pub feedback: bool,
-}
-
-impl Lanes {
-    /// Both lanes.
-    pub const BOTH: Self = Self { network: true, feedback: true };
-    /// No lane: the loop gets the desired reference, to the bit.
-    pub const NONE: Self = Self { network: false, feedback: false };
-}
 
 /// How fast lanes come and go.
 pub(super) struct Fade {

@@ -28,7 +28,7 @@ impl<const BYTES: usize> Place<BYTES> {
         Self([0; BYTES])
     }
 
-    /// Copies `file` here, where it stays; nothing if it is too long. Its check sum is [`super::Model::from_bytes`]' affair.
+    /// Copies `file` here, where it stays; nothing if it is too long. Its check sum is [`Model::from_bytes`](crate::model::Model::from_bytes)' affair.
     pub fn hold(&mut self, file: &[u8]) -> Option<&[u8]> {
         let place = self.0.get_mut(..file.len())?;
         place.copy_from_slice(file);

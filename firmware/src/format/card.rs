@@ -6,11 +6,7 @@
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    features::{Feature, Source},
-    network::Activation,
-    preview::EndRule,
-};
+use super::{Feature, Source};
 
 /// Most channels in one signal.
 pub const MAX_CHANNELS: usize = 16;
@@ -28,6 +24,8 @@ pub const MAX_AXES: usize = 4;
 pub const MAX_LAGS: usize = 32;
 /// Most errors that one axis of a feedback lane reads.
 pub const MAX_ERRORS: usize = 2;
+/// Sub-rate ticks of measured and past reference channels that features can read.
+pub const HISTORY: usize = 16;
 /// Most monitor ticks that a response of the monitor lasts.
 pub const MAX_TAPS: usize = 32;
 /// Most corrections whose response one axis of the monitor adds up.
@@ -40,6 +38,16 @@ pub struct Section {
     pub offset: u32,
     /// Length in bytes.
     pub length: u32,
+}
+
+/// What a channel is before the first and after the last sample of the desired trajectory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum EndRule {
+    /// The nearest sample is held (positions, angles).
+    #[default]
+    Hold,
+    /// Zero (velocities, accelerations): the trajectory stands still beyond its ends.
+    Zero,
 }
 
 /// One channel of a signal.
@@ -157,6 +165,17 @@ pub enum Arithmetic {
     Int8,
     /// The same with int16 weights.
     Int16,
+}
+
+/// Non-linearity behind a dense layer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Activation {
+    /// The identity.
+    Linear,
+    /// max(0, x).
+    Relu,
+    /// Hyperbolic tangent.
+    Tanh,
 }
 
 /// One dense layer; the meaning of the sections follows from [`Arithmetic`].
@@ -320,7 +339,7 @@ pub struct Card<'a> {
 
 impl Card<'_> {
     /// Of no model.
-    pub(super) const EMPTY: Self = {
+    pub(crate) const EMPTY: Self = {
         let section = Section { offset: 0, length: 0 };
         Self {
             name: "",

@@ -8,52 +8,60 @@
 use heapless::Vec;
 use serde::Deserialize;
 
-use super::Card;
+use super::{Card, Refusal};
 
-/// Decodes into `card`; `None` if the bytes are no card, or one that is too large.
-pub(super) fn card<'a>(mut bytes: &'a [u8], card: &mut Card<'a>) -> Option<&'a [u8]> {
+/// Decodes into `card`.
+///
+/// # Errors
+/// If the bytes are no card ([`Refusal::Card`]), or a list of it is longer than this build holds.
+pub(crate) fn card<'a>(mut bytes: &'a [u8], card: &mut Card<'a>) -> Result<&'a [u8], Refusal> {
     let rest = &mut bytes;
     let Card { name, provenance, signals, timing, features, outputs, network, lane, monitor, envelope, bounds, probes } = card;
     take(rest, name)?;
     take(rest, provenance)?;
-    list(rest, &mut signals.desired)?;
-    list(rest, &mut signals.measured)?;
-    list(rest, &mut signals.reference)?;
+    list(rest, &mut signals.desired, "number of desired channels")?;
+    list(rest, &mut signals.measured, "number of measured channels")?;
+    list(rest, &mut signals.reference, "number of reference channels")?;
     take(rest, timing)?;
-    list(rest, features)?;
-    list(rest, outputs)?;
+    list(rest, features, "number of features")?;
+    list(rest, outputs, "number of outputs")?;
     take(rest, network)?;
     take(rest, lane)?;
     take(rest, monitor)?;
     take(rest, envelope)?;
     take(rest, bounds)?;
     take(rest, probes)?;
-    Some(bytes)
+    Ok(bytes)
 }
 
 #[inline(never)]
-fn take<'a, T: Deserialize<'a>>(bytes: &mut &'a [u8], place: &mut T) -> Option<()> {
-    let (value, rest) = postcard::take_from_bytes(bytes).ok()?;
+fn take<'a, T: Deserialize<'a>>(bytes: &mut &'a [u8], place: &mut T) -> Result<(), Refusal> {
+    let (value, rest) = postcard::take_from_bytes(bytes).map_err(|_| Refusal::Card)?;
     (*place, *bytes) = (value, rest);
-    Some(())
+    Ok(())
 }
 
-fn list<'a, T: Deserialize<'a>, const N: usize>(bytes: &mut &'a [u8], items: &mut Vec<T, N>) -> Option<()> {
+/// A list that is too long is read to its end, so that a damaged length is not taken for one.
+fn list<'a, T: Deserialize<'a>, const N: usize>(
+    bytes: &mut &'a [u8],
+    items: &mut Vec<T, N>,
+    what: &'static str,
+) -> Result<(), Refusal> {
     items.clear();
-    let mut count = 0_usize;
+    let mut count = 0_u32;
     take(bytes, &mut count)?;
     for _ in 0..count {
-        let (item, rest) = postcard::take_from_bytes(bytes).ok()?;
-        items.push(item).ok()?;
+        let (item, rest) = postcard::take_from_bytes(bytes).map_err(|_| Refusal::Card)?;
+        let _ = items.push(item);
         *bytes = rest;
     }
-    Some(())
+    if count as usize > N { Err(Refusal::Shape { what, found: count, limit: N as u32 }) } else { Ok(()) }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::file;
+    use crate::format::file;
     use proptest::prelude::*;
 
     proptest! {
@@ -73,8 +81,8 @@ mod tests {
             let rest = card(&bytes, &mut found);
             match postcard::take_from_bytes::<Card<'_>>(&bytes) {
                 // By text: a number that is none is not equal to itself.
-                Ok((expected, behind)) => prop_assert_eq!((format!("{found:?}"), rest), (format!("{expected:?}"), Some(behind))),
-                Err(_) => prop_assert_eq!(rest, None),
+                Ok((expected, behind)) => prop_assert_eq!((format!("{found:?}"), rest), (format!("{expected:?}"), Ok(behind))),
+                Err(_) => prop_assert!(rest.is_err()),
             }
         }
     }

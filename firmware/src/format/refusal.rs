@@ -17,6 +17,8 @@ pub enum Refusal {
     Version {
         /// Version in the file.
         found: u16,
+        /// Version that this build reads.
+        expected: u16,
     },
     /// The header's lengths and the number of bytes disagree.
     Length {
@@ -32,7 +34,7 @@ pub enum Refusal {
         /// Check sum of the bytes.
         computed: u32,
     },
-    /// The card cannot be decoded.
+    /// The card cannot be decoded: it is damaged, or a list inside of one of its fields is longer than this build holds.
     Card,
     /// A count or shape is impossible or beyond this build's fixed sizes.
     Shape {
@@ -136,12 +138,8 @@ impl fmt::Display for Refusal {
             Self::NotAModel => {
                 write!(f, "not a model file (its first bytes are not IMPROMPT): give the file that model-export wrote")
             }
-            Self::Version { found } => {
-                write!(
-                    f,
-                    "format version {found}, this build reads {}: export the model with the matching model-export",
-                    super::file::VERSION
-                )
+            Self::Version { found, expected } => {
+                write!(f, "format version {found}, this build reads {expected}: export the model with the matching model-export")
             }
             Self::Length { expected, found } => {
                 write!(
@@ -152,7 +150,10 @@ impl fmt::Display for Refusal {
             Self::Checksum { stored, computed } => {
                 write!(f, "check sum {stored:08x} in the file, {computed:08x} computed: the file is damaged, copy it again")
             }
-            Self::Card => write!(f, "the model card cannot be decoded: export the model again"),
+            Self::Card => write!(
+                f,
+                "the model card cannot be decoded: it is damaged, or made for a build that holds longer lists; export the model again with this build's model-export"
+            ),
             Self::Shape { what, found, limit } => write!(f, "{what} is {found}, possible is {limit}: train a model that fits"),
             Self::SectionLength { what, expected, found } => {
                 write!(f, "section {what} has {found} bytes, its shape asks for {expected}: export the model again")

@@ -81,7 +81,7 @@ pub fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), Refusal> {
     }
     let version = u16::from_le_bytes([header[8], header[9]]);
     if version != VERSION {
-        return Err(Refusal::Version { found: version });
+        return Err(Refusal::Version { found: version, expected: VERSION });
     }
     if header[10..12].iter().chain(&header[24..]).any(|byte| *byte != 0) {
         return Err(Refusal::Value { what: "reserved part of the header" });
