@@ -25,7 +25,7 @@ pub use inference::{Inference, Job};
 use lanes::Fade;
 pub use lanes::Lanes;
 use ramp::Ramp;
-use signals::{History, View, base_channels, same_signals};
+use signals::{History, View, base_channels, same_signals, whole_signals};
 
 /// Sub-rate ticks of measured and reference history that features can read.
 pub const HISTORY: usize = 16;
@@ -116,6 +116,18 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.base = base_channels(table);
         (self.deferred, self.loop_gain) = (false, 1.0);
         self.restart();
+    }
+
+    /// Takes the model away, in place: from now on the reference is the desired one of an application whose signals are `table`.
+    ///
+    /// # Errors
+    /// If a signal has too many channels, or a reference channel the name of no desired one; then nothing changes.
+    pub fn bypass(&mut self, table: &Channels<'_>) -> Result<(), Refusal> {
+        whole_signals(table, [D, M, R])?;
+        self.model = None;
+        self.base = base_channels(table);
+        self.restart();
+        Ok(())
     }
 
     /// Forgets everything but the model and its guard's settings, also the counts: as it was when the model came. Both lanes are off.

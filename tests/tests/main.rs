@@ -13,6 +13,7 @@
 //! - [`link`]: any bytes on the link are refused or messages, never a panic;
 //! - [`processor`]: control is never late, whatever the network takes; the processor's share; late inferences;
 //! - [`pil`]: the flashed binary flies the plant, bit for bit, through good lines and bad ones;
+//! - [`servo`]: the servo of the library's examples, its model made again from its logs, its tasks on the emulated board;
 //! - [`unsafe_code`]: there is none but those kernels, each block with its reason;
 //! - [`upload`]: a model goes over the link into the flash, and flies from the next start on.
 //!
@@ -32,5 +33,6 @@ mod link;
 mod mcu;
 mod pil;
 mod processor;
+mod servo;
 mod unsafe_code;
 mod upload;
