@@ -25,7 +25,7 @@ use fade::Fade;
 use feedback::Feedback;
 pub use inference::{Inference, Job};
 use ramp::Ramp;
-use signals::{History, View, base_channels, same_signals};
+use signals::{History, View, base_channels, same_signals, whole_signals};
 
 pub use crate::{format::HISTORY, lanes::Lanes};
 
@@ -131,6 +131,18 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     pub fn unload(&mut self) {
         self.model = None;
         self.restart();
+    }
+
+    /// Takes the model away, in place: from now on the reference is the desired one of an application whose signals are `table`.
+    ///
+    /// # Errors
+    /// If a signal has too many channels, or a reference channel the name of no desired one; then nothing changes.
+    pub fn bypass(&mut self, table: &Channels<'_>) -> Result<(), Refusal> {
+        whole_signals(table, [D, M, R])?;
+        self.model = None;
+        self.base = base_channels(table);
+        self.restart();
+        Ok(())
     }
 
     /// Forgets everything but the model and its guard's settings, also the counts: as it was when the model came. Both lanes are off.

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// Which lanes act.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Lanes {
     /// The network lane.
     pub network: bool,

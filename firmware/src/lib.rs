@@ -12,6 +12,48 @@
 //! there are, and in which frames, says the model. The same bits on the host and on a Cortex-M4F. Errors exist where bytes enter
 //! ([`Model::from_bytes`](model::Model::from_bytes), [`storage`]); in flight nothing returns a `Result`.
 //!
+//! # A whole use
+//!
+//! A servo's position loop runs at 500 Hz and lags behind; the model was trained on its logs. [`AddOn`] comes between the trajectory
+//! and the loop. In a static, without a model, with the network in another task: see there, and `examples/`.
+//!
+//! ```
+//! use impromptu_firmware::{AddOn, Channel, Channels, EndRule, Lanes, Model, Scratch};
+//!
+//! // What the loop is told, measures, and tracks. A model for anything else is refused.
+//! const ANGLE: Channel = Channel { name: "angle", unit: "rad", frame: "output shaft", end: EndRule::Hold };
+//! const SIGNALS: Channels = Channels { desired: &[ANGLE], measured: &[ANGLE], reference: &[ANGLE] };
+//!
+//! let model = Model::from_bytes(include_bytes!("../examples/one_axis.impromptu"))?;
+//! let ahead = model.card().preview_span().1 as i32;
+//! let mut add_on = AddOn::<1, 1, 1, 128>::new(&model, SIGNALS, 500.0)?;
+//! let mut scratch = Scratch::new();
+//! add_on.switch(Lanes::BOTH);
+//! # use impromptu_firmware::math::sin_cos;
+//! # fn desired(tick: i32) -> f32 { 0.8 - 0.8 * sin_cos(0.006 * tick as f32).1 }
+//! # #[derive(Default)] struct Servo { angle: f32, speed: f32, error: f32 }
+//! # impl Servo {
+//! #     fn angle(&self) -> f32 { self.angle }
+//! #     fn track(&mut self, reference: f32) {
+//! #         self.speed += 0.002 * (500.0 * (reference - self.angle) - 35.0 * self.speed);
+//! #         self.angle += 0.002 * self.speed;
+//! #     }
+//! # }
+//! # let mut servo = Servo::default();
+//! for tick in 0..5_000 {
+//!     // The trajectory, ahead of time.
+//!     while add_on.next_tick() <= tick + ahead {
+//!         add_on.push([desired(add_on.next_tick())])?;
+//!     }
+//! #   servo.error = servo.error.max((servo.angle() - desired(tick)).abs());
+//!     let [reference] = add_on.step(tick, &[servo.angle()], &mut scratch);
+//!     servo.track(reference);
+//! }
+//! # assert!(servo.error < 0.1, "{}", servo.error);
+//! assert_eq!(add_on.report().trips.by_lane(), [0, 0]);
+//! # Ok::<(), Box<dyn core::error::Error>>(())
+//! ```
+//!
 //! # Layers
 //!
 //! At the bottom stand functions and values that know nothing of a model. On them stands what is stored of one: bytes and types.
@@ -34,6 +76,7 @@
 //! | 4 | `guard` | which lanes may act: inputs, limits, and what the error would be without a lane |
 //! | 5 | `model` | a model file whose every index, shape and probe has been checked |
 //! | 6 | `adapter` | the add-on: lanes, guard and bounds between the desired trajectory and a loop |
+//! | 7 | `add_on` | the adapter with the trajectory ahead of it, for one loop: what most applications use |
 //! | 6 | `storage` | models in flash, replaced without a new program |
 //!
 //! # Words
@@ -49,6 +92,7 @@
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 pub mod adapter;
+pub mod add_on;
 pub mod exchange;
 pub mod features;
 pub mod feedback;
@@ -63,6 +107,7 @@ pub mod region;
 pub mod storage;
 
 pub use adapter::{Adapter, Inference, Job};
+pub use add_on::AddOn;
 pub use format::{Channel, Channels, EndRule, Refusal};
 pub use guard::{GuardSettings, Trip, Trips};
 pub use lanes::Lanes;

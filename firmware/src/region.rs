@@ -22,6 +22,8 @@ use crate::math::clamp;
 
 /// Why regions are refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum RegionError {
     /// No region at all.
     Empty,

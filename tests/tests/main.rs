@@ -14,6 +14,7 @@
 //! - [`processor`]: control is never late, whatever the network takes; the processor's share; late inferences;
 //! - [`pil`]: the flashed binary flies the plant, bit for bit, through good lines and bad ones;
 //! - [`structure`]: no circle between files, no use against the layers that each crate states;
+//! - [`servo`]: the servo of the library's examples, its model made again from its logs, its tasks on the emulated board;
 //! - [`upload`]: a model goes over the link into the flash, and flies from the next start on.
 //!
 //! The parts have tests of their own: plant against an independent simulator and every generator and parser in `host-sim`, model
@@ -32,5 +33,6 @@ mod link;
 mod mcu;
 mod pil;
 mod processor;
+mod servo;
 mod structure;
 mod upload;

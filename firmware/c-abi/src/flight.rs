@@ -5,6 +5,7 @@
 
 use impromptu_firmware::{
     adapter::{Inference, Job, Lanes},
+    add_on,
     model::Model,
     network::Scratch,
 };
@@ -82,7 +83,7 @@ impl Stack {
     /// If there is no model.
     pub fn report(&mut self) -> Result<Report, Status> {
         let next_tick = self.flight.next_setpoint();
-        Ok(Report::new(self.flight.adapter().ok_or(Status::Nothing)?, next_tick))
+        Ok(add_on::Report::of(self.flight.adapter().ok_or(Status::Nothing)?, next_tick).into())
     }
 
     fn command(&self, command: &MotorCommand) -> Command {

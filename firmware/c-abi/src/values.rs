@@ -6,7 +6,7 @@
 use core::ffi::c_char;
 
 use impromptu_firmware::{
-    adapter::{self, Adapter},
+    adapter, add_on,
     model::{self, Model},
 };
 use impromptu_flight::{
@@ -162,18 +162,10 @@ pub struct Report {
     pub next_tick: i32,
 }
 
-impl Report {
-    /// Of an adapter whose next sample is that of `next_tick`.
-    pub fn new<const D: usize, const M: usize, const R: usize>(adapter: &Adapter<'_, D, M, R>, next_tick: i32) -> Self {
-        let [network_weight, feedback_weight] = adapter.weights();
-        Self {
-            correction: *adapter.correction(),
-            network_weight,
-            feedback_weight,
-            saturations: adapter.saturations(),
-            late: adapter.late(),
-            next_tick,
-        }
+impl From<add_on::Report> for Report {
+    fn from(report: add_on::Report) -> Self {
+        let add_on::Report { correction, network_weight, feedback_weight, saturations, late, next_tick, .. } = report;
+        Self { correction, network_weight, feedback_weight, saturations, late, next_tick }
     }
 }
 

@@ -4,6 +4,8 @@ use core::fmt;
 
 /// The reason, with the name of what is wrong. `Display` also says what to do.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum Refusal {
     /// Fewer bytes than a header.

@@ -56,6 +56,8 @@ fn dot(coefficients: Floats<'_>, values: &[f32], start: f32) -> f32 {
 
 /// Recent energies of the loop's errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Energies {
     /// As they are.
     pub with: f32,

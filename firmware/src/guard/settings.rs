@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 /// When lanes trip and come back. Those of evidence and oscillation trip lanes in validation strokes only where
 /// motors saturate (1.7 times the speed).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[serde(default, deny_unknown_fields)]
 pub struct GuardSettings {
     /// Whether the guard acts at all. Off for flights that judge what a lane does by itself.

@@ -2,6 +2,8 @@
 
 /// Why a lane is off although it is wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(u8)]
 pub enum Trip {
     /// Features outside of the training envelope (network lane).
@@ -46,6 +48,8 @@ impl Trip {
 
 /// Trips since the start, by [`Trip::index`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Trips {
     /// Of the network lane.
     pub network: [u16; Trip::ALL.len()],

@@ -8,6 +8,7 @@ use crate::format::Refusal;
 
 /// What the flash was asked to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Operation {
     /// Erase the slot.
     Erase,
@@ -30,6 +31,7 @@ impl fmt::Display for Operation {
 /// The reason, with what was found and expected. `Display` also says what to do. Whatever the reason, the model in the other slot is
 /// untouched.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum StorageError {
     /// The motors may turn.
@@ -80,6 +82,7 @@ pub enum StorageError {
         /// What it was asked to do.
         operation: Operation,
         /// The driver's error.
+        #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
         kind: NorFlashErrorKind,
     },
     /// The flash does not hold the header that was written.

@@ -59,7 +59,7 @@ fn bits(values: [f32; 2]) -> [u32; 2] {
 }
 
 /// A window network and a lane with large numbers.
-fn violent(seed: u64, interpolation: Interpolation) -> (Description, Vec<u8>) {
+pub(crate) fn violent(seed: u64, interpolation: Interpolation) -> (Description, Vec<u8>) {
     let mut numbers = Numbers(seed);
     let mut float = network(&mut numbers, 4, &[(9, Activation::Tanh)], 2, true);
     float.output_scale = vec![3.0, 20.0];

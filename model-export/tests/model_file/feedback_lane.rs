@@ -1,12 +1,12 @@
 //! The feedback lane in the adapter and by itself.
 
 use impromptu_firmware::{
-    adapter::{Adapter, Lanes},
+    adapter::Lanes,
+    add_on::AddOn,
     feedback::AxisState,
     guard::GuardSettings,
     model::{Model, Output},
     network::Scratch,
-    preview::{EndRule, Preview},
 };
 use impromptu_model_export::{
     Description, Precision,
@@ -38,15 +38,15 @@ fn corrections(
 ) -> Vec<f32> {
     let (description, bytes) = lane_only(lane, delay_s);
     let model = Model::from_bytes(&bytes).unwrap();
-    let mut adapter: Adapter<'_, 2, 2, 2> = Adapter::new(&model, &table(&description), 100.0, CAPACITY).unwrap();
-    adapter.set_guard(GuardSettings::OFF);
-    adapter.switch(Lanes { network: false, feedback: true });
-    let mut preview = Preview::<2, CAPACITY>::new([EndRule::Hold, EndRule::Zero], -16);
-    (-16..0).for_each(|tick| preview.push(desired(tick)));
+    let mut add_on = AddOn::<2, 2, 2, CAPACITY>::new(&model, &table(&description), 100.0).unwrap();
+    add_on.set_guard(GuardSettings::OFF);
+    add_on.switch(Lanes { network: false, feedback: true });
+    add_on.restart(-16);
+    (-16..0).for_each(|tick| add_on.push(desired(tick)).unwrap());
     let step = |tick| {
-        preview.push(desired(tick));
-        adapter.step(tick, &preview, &measured(tick), &mut Scratch::new());
-        adapter.correction()[0]
+        add_on.push(desired(tick)).unwrap();
+        add_on.step(tick, &measured(tick), &mut Scratch::new());
+        add_on.report().correction[0]
     };
     (0..ticks).map(step).collect()
 }
@@ -179,13 +179,12 @@ fn limited_outputs_enter_the_lags_as_applied() {
     description.feedback_lane = Some(memory);
     let bytes = encode(&description, None, Precision::Float, &[]).unwrap();
     let model = Model::from_bytes(&bytes).unwrap();
-    let mut adapter: Adapter<'_, 2, 2, 2> = Adapter::new(&model, &table(&description), 100.0, CAPACITY).unwrap();
-    adapter.switch(Lanes::BOTH);
-    let mut preview = Preview::<2, CAPACITY>::new([EndRule::Hold, EndRule::Zero], 0);
+    let mut add_on = AddOn::<2, 2, 2, CAPACITY>::new(&model, &table(&description), 100.0).unwrap();
+    add_on.switch(Lanes::BOTH);
     let mut step = |tick, error| {
-        preview.push([0.0, 0.0]);
-        adapter.step(tick, &preview, &[error, 0.0], &mut Scratch::new());
-        adapter.correction()[0]
+        add_on.push([0.0, 0.0]).unwrap();
+        add_on.step(tick, &[error, 0.0], &mut Scratch::new());
+        add_on.report().correction[0]
     };
     assert_eq!(step(0, -0.1), 0.02);
     // -0.5 times the 0.02 that were applied, not the 0.1 that were wanted.

@@ -1,11 +1,12 @@
-//! The adapter knows no quadrotor: the first system of Zhou 2017 (equation 9), flown with the exact inverse as a linear map.
+//! The add-on knows no quadrotor: the first system of Zhou 2017 (equation 9), flown with the exact inverse as a linear map.
 
 use impromptu_firmware::{
-    adapter::{Adapter, Lanes},
+    adapter::Lanes,
+    add_on::AddOn,
     features::{Feature, Relative, Source},
     model::{Interpolation, Model, Output},
     network::Scratch,
-    preview::{EndRule, Preview},
+    preview::EndRule,
 };
 use impromptu_model_export::{
     Description, FloatNetwork, Precision,
@@ -65,19 +66,18 @@ fn tracking_error(lanes: Lanes) -> f64 {
     let description = description();
     let bytes = encode(&description, Some(&exact_law()), Precision::Float, &[]).unwrap();
     let model = Model::from_bytes(&bytes).unwrap();
-    let mut adapter: Adapter<'_, 1, 2, 1> = Adapter::new(&model, &table(&description), 100.0, 8).unwrap();
-    adapter.switch(lanes);
+    let mut add_on = AddOn::<1, 2, 1, 8>::new(&model, &table(&description), 100.0).unwrap();
+    add_on.switch(lanes);
     let desired = |tick: i32| {
         let t = 0.01 * f64::from(tick);
         (std::f64::consts::TAU * t / 15.0).sin() + (std::f64::consts::TAU * t / 12.0).cos() - 1.0
     };
-    let mut preview = Preview::<1, 8>::new([EndRule::Hold], 0);
-    preview.push([desired(0) as f32]);
+    add_on.push([desired(0) as f32]).unwrap();
     let (mut x, mut sum) = ([0.0f64; 2], 0.0);
     let ticks = 6000;
     for tick in 0..ticks {
-        preview.push([desired(tick + 1) as f32]);
-        let [u] = adapter.step(tick, &preview, &x.map(|x| x as f32), &mut Scratch::new());
+        add_on.push([desired(tick + 1) as f32]).unwrap();
+        let [u] = add_on.step(tick, &x.map(|x| x as f32), &mut Scratch::new());
         x = [x[1], -0.15 * x[0] + 0.8 * x[1] + f64::from(u)];
         let y = -0.2 * x[0] + x[1];
         sum += (y - desired(tick + 1)).powi(2);

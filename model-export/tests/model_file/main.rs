@@ -14,5 +14,6 @@ mod refusals;
 mod round_trip;
 
 mod adapter;
+mod add_on;
 mod feedback_lane;
 mod generic_loop;

@@ -1,9 +1,9 @@
 //! The adapter alone, from C.
 
-use core::{ffi::c_int, ptr};
+use core::ffi::c_int;
 
 use impromptu_firmware::{
-    adapter::{Adapter, Lanes},
+    adapter::Lanes,
     model::{Channels, Model},
     network::Scratch,
 };
@@ -11,10 +11,10 @@ use impromptu_flight::quadrotor;
 
 use super::{Place, channels, create, input, object, report, signals::table, view};
 use crate::{
-    adapter::{EMPTY, Layout, PARKED, Stage},
+    adapter::{EMPTY, Stage, counted},
     memory::{AdapterMemory, ModelMemory, Object, ScratchMemory},
     status::Status,
-    values::{Inference, Job, MAX_CHANNELS, PREVIEW, Report, Signals},
+    values::{Inference, Job, Report, Signals},
 };
 
 /// Creates an adapter in `adapter`, which has `size` bytes, for a loop whose references run at `rate_hz`. Both lanes are off.
@@ -68,18 +68,13 @@ unsafe fn fill(
     rate_hz: f32,
     first_tick: i32,
 ) -> Result<(), Status> {
-    Adapter::<MAX_CHANNELS, MAX_CHANNELS, MAX_CHANNELS>::check(model, table, rate_hz, PREVIEW)?;
-    let layout = Layout::new(table);
-    // SAFETY: memory for an adapter that nobody else uses; all of its fields are written.
-    unsafe {
-        let adapter = ptr::addr_of_mut!((*stage).adapter);
-        adapter.write(PARKED);
-        (*adapter).load(model, table);
-        let preview = ptr::addr_of_mut!((*stage).preview);
-        preview.write(EMPTY);
-        (*preview).restart(layout.rules, first_tick);
-        ptr::addr_of_mut!((*stage).layout).write(layout);
-    }
+    // SAFETY: memory for an add-on that nobody else uses; it is written whole before it is referred to.
+    let stage = unsafe {
+        stage.write(EMPTY);
+        &mut *stage
+    };
+    stage.load(model, table, rate_hz)?;
+    stage.restart(first_tick);
     Ok(())
 }
 
@@ -90,8 +85,8 @@ pub unsafe extern "C" fn impromptu_adapter_push(adapter: *mut AdapterMemory, des
     report(|| {
         // SAFETY: the module's rules.
         let (adapter, desired) = unsafe { (object::<Stage>(adapter)?, channels(desired, count)?) };
-        adapter.counted([Some(count), None, None])?;
-        adapter.push(desired)
+        counted(adapter, [Some(count), None, None])?;
+        Ok(adapter.push(desired)?)
     })
 }
 
@@ -144,7 +139,7 @@ pub unsafe extern "C" fn impromptu_adapter_step(
         let (adapter, scratch) = unsafe { (object::<Stage>(adapter)?, object::<Scratch>(scratch)?) };
         // SAFETY: the module's rules.
         let measured = unsafe { channels(measured, measured_count)? };
-        adapter.counted([None, Some(measured_count), Some(reference_count)])?;
+        counted(adapter, [None, Some(measured_count), Some(reference_count)])?;
         let values = adapter.step(tick, &measured, scratch);
         // SAFETY: the module's rules.
         unsafe { place.write_first(&values, reference_count) };
@@ -168,7 +163,7 @@ pub unsafe extern "C" fn impromptu_adapter_begin(
         let (place, flag) = (Place::new(job)?, Place::new(due)?);
         // SAFETY: the module's rules.
         let (adapter, measured) = unsafe { (object::<Stage>(adapter)?, channels(measured, measured_count)?) };
-        adapter.counted([None, Some(measured_count), None])?;
+        counted(adapter, [None, Some(measured_count), None])?;
         let released = adapter.begin(tick, &measured);
         // SAFETY: the module's rules.
         unsafe {
@@ -206,7 +201,7 @@ pub unsafe extern "C" fn impromptu_adapter_finish(
         let place = Place::new(reference)?;
         // SAFETY: the module's rules.
         let (adapter, measured) = unsafe { (object::<Stage>(adapter)?, channels(measured, measured_count)?) };
-        adapter.counted([None, Some(measured_count), Some(reference_count)])?;
+        counted(adapter, [None, Some(measured_count), Some(reference_count)])?;
         let values = adapter.finish(tick, &measured);
         // SAFETY: the module's rules.
         unsafe { place.write_first(&values, reference_count) };
@@ -220,7 +215,7 @@ pub unsafe extern "C" fn impromptu_adapter_report(adapter: *mut AdapterMemory, r
     report(|| {
         let place = Place::new(result)?;
         // SAFETY: the module's rules.
-        unsafe { place.write(object::<Stage>(adapter)?.report()) };
+        unsafe { place.write(object::<Stage>(adapter)?.report().into()) };
         Ok(())
     })
 }

@@ -3,15 +3,15 @@
 //! *in* and *out* those of the firmware's flight stack, which flies inside; *never* another loop than the firmware's; *source* Zhou 2017, Fig. 4.
 
 use impromptu_firmware::{
-    adapter::{Adapter, Lanes},
+    adapter::Lanes,
+    add_on::AddOn,
     guard::{GuardSettings, Trips},
     model::{Model, Refusal},
     network::Scratch,
-    preview::Preview,
 };
 use impromptu_flight::{
-    flight::{Flight, PREVIEW, QuadrotorAdapter, Settings},
-    quadrotor::{self, DESIRED, END_RULES},
+    flight::{Flight, PREVIEW, Settings},
+    quadrotor::{self, DESIRED, MEASURED, REFERENCE},
     types::{MotorCommand, Reference, Setpoint, State, Tick},
 };
 use impromptu_sim::rollout::{FaultyFlight, FlightStack};
@@ -23,8 +23,7 @@ pub const GAIN: f32 = 0.5;
 /// The stack.
 pub struct HalfHeight<'m> {
     inside: FaultyFlight<'m>,
-    preview: Preview<DESIRED, PREVIEW>,
-    adapter: Option<QuadrotorAdapter<'m>>,
+    add_on: AddOn<'m, DESIRED, MEASURED, REFERENCE, PREVIEW>,
     scratch: Scratch,
     reference: Reference,
     divisor: u32,
@@ -36,19 +35,19 @@ impl<'m> HalfHeight<'m> {
     /// # Errors
     /// If the model is refused.
     pub fn new(settings: &Settings, command_delay: u32, model: Option<&'m Model<'m>>) -> Result<Option<Self>, Refusal> {
-        let adapter = model
-            .map(|model| {
-                let mut adapter = Adapter::new(model, quadrotor::signals(), settings.rates.reference_hz(), PREVIEW)?;
-                adapter.set_guard(GuardSettings::OFF);
-                adapter.switch(Lanes { network: true, feedback: false });
-                Ok(adapter)
-            })
-            .transpose()?;
+        let (mut add_on, signals) = (AddOn::empty(), quadrotor::signals());
+        match model {
+            Some(model) => {
+                add_on.load(model, signals, settings.rates.reference_hz())?;
+                add_on.set_guard(GuardSettings::OFF);
+                add_on.switch(Lanes { network: true, feedback: false });
+            }
+            None => add_on.bypass(signals)?,
+        }
         let Some(inside) = Flight::new(settings) else { return Ok(None) };
         Ok(Some(Self {
             inside: FaultyFlight::new(inside, 1.0, command_delay),
-            preview: Preview::new(END_RULES, 0),
-            adapter,
+            add_on,
             scratch: Scratch::new(),
             reference: Reference::ORIGIN,
             divisor: settings.rates.position_divisor.max(1),
@@ -58,11 +57,11 @@ impl<'m> HalfHeight<'m> {
 
 impl FlightStack for HalfHeight<'_> {
     fn push_setpoint(&mut self, setpoint: &Setpoint) {
-        self.preview.push(quadrotor::desired(setpoint));
+        self.add_on.push(quadrotor::desired(setpoint)).expect("trajectories are finite");
     }
 
     fn next_setpoint(&self) -> i32 {
-        self.preview.next_tick()
+        self.add_on.next_tick()
     }
 
     fn excite(&mut self, _: Vector3<f32>) {}
@@ -70,13 +69,9 @@ impl FlightStack for HalfHeight<'_> {
     fn step(&mut self, tick: Tick, state: &State) -> MotorCommand {
         if tick.0.is_multiple_of(self.divisor) {
             let now = (tick.0 / self.divisor) as i32;
-            let desired = self.preview.sample(now);
-            let [x, y, z, vx, vy, vz, ..] = desired;
-            let channels = match &mut self.adapter {
-                Some(adapter) => adapter.step(now, &self.preview, &quadrotor::measured(state), &mut self.scratch),
-                None => [x, y, z, vx, vy, vz],
-            };
-            self.reference = quadrotor::reference(&channels, desired[9]);
+            let yaw = self.add_on.desired(now)[9];
+            let channels = self.add_on.step(now, &quadrotor::measured(state), &mut self.scratch);
+            self.reference = quadrotor::reference(&channels, yaw);
             let halved = |vector: &Vector3<f32>| Vector3::new(vector.x, vector.y, GAIN * vector.z);
             self.inside.flight.push_setpoint(&Setpoint {
                 position: halved(&self.reference.position),

@@ -1,0 +1,146 @@
+//! The add-on is the adapter with the trajectory ahead of it: the same bits, in place too, and the desired reference without a model.
+
+use impromptu_firmware::{
+    adapter::{Adapter, Lanes},
+    add_on::{AddOn, NotFinite, Report},
+    model::{Channels, Interpolation, Model, Refusal},
+    network::Scratch,
+    preview::{EndRule, Preview},
+};
+use proptest::prelude::*;
+
+use crate::{
+    adapter::violent,
+    fixture::{Numbers, constant_model, description, table},
+};
+
+const CAPACITY: usize = 128;
+const AHEAD: i32 = 60;
+type Cart<'m> = AddOn<'m, 2, 2, 2, CAPACITY>;
+
+fn bits(values: [f32; 2]) -> [u32; 2] {
+    values.map(f32::to_bits)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    /// Whole ticks, and ticks whose network is evaluated later, whatever was in the add-on's place before.
+    #[test]
+    fn an_add_on_gives_the_bits_of_an_adapter(seed in any::<u64>(), first in -500i32..500, linear in any::<bool>(), delay in 0i32..10) {
+        let interpolation = if linear { Interpolation::Linear } else { Interpolation::Hold };
+        let (description, bytes) = violent(seed, interpolation);
+        let model = Model::from_bytes(&bytes).unwrap();
+        let table = table(&description);
+        let (mut adapter, mut preview) = (
+            Adapter::<2, 2, 2>::new(&model, &table, 100.0, CAPACITY).unwrap(),
+            Preview::<2, CAPACITY>::new([EndRule::Hold, EndRule::Zero], first),
+        );
+        let (mut whole, mut split) = (Cart::new(&model, &table, 100.0).unwrap(), Cart::empty());
+        split.bypass(&table).unwrap();
+        split.push([9.0, 9.0]).unwrap();
+        split.load(&model, &table, 100.0).unwrap();
+        if linear {
+            split.defer();
+        }
+        let (mut numbers, mut scratch, mut waiting) = (Numbers(seed ^ 1), Scratch::new(), None);
+        let mut push = |preview: &mut Preview<2, CAPACITY>, add_ons: [&mut Cart<'_>; 2]| {
+            let sample = [numbers.next(), numbers.next()];
+            preview.push(sample);
+            add_ons.map(|add_on| add_on.push(sample).unwrap());
+        };
+        whole.restart(first);
+        split.restart(first);
+        adapter.switch(Lanes::BOTH);
+        whole.switch(Lanes::BOTH);
+        split.switch(Lanes::BOTH);
+        (0..AHEAD).for_each(|_| push(&mut preview, [&mut whole, &mut split]));
+        let mut measure = Numbers(seed ^ 2);
+        for tick in first..first + 150 {
+            push(&mut preview, [&mut whole, &mut split]);
+            let measured = [measure.next(), measure.next()];
+            let expected = adapter.step(tick, &preview, &measured, &mut scratch);
+            prop_assert_eq!(bits(whole.step(tick, &measured, &mut scratch)), bits(expected), "tick {}", tick);
+            // A held correction is wanted at once, a ramped one within the sub-rate tick of ten.
+            let later = if linear { delay } else { 0 };
+            if let Some(job) = split.begin(tick, &measured) {
+                waiting = Some((tick + later, job.run(model.network().unwrap(), &mut scratch)));
+            }
+            if waiting.as_ref().is_some_and(|(due, _)| *due <= tick) {
+                split.deliver(waiting.take().unwrap().1);
+            }
+            prop_assert_eq!(bits(split.finish(tick, &measured)), bits(expected), "tick {}", tick);
+            let report = Report::of(&adapter, preview.next_tick());
+            prop_assert_eq!((whole.report(), split.report()), (report, report));
+        }
+    }
+}
+
+#[test]
+fn without_a_model_the_reference_is_the_desired_one() {
+    let description = description(1);
+    let table = table(&description);
+    let mut add_on = Cart::empty();
+    add_on.bypass(&table).unwrap();
+    add_on.switch(Lanes::BOTH);
+    add_on.push([1.5, -0.0]).unwrap();
+    assert_eq!(bits(add_on.step(0, &[f32::NAN, 1.0], &mut Scratch::new())), bits([1.5, -0.0]));
+    // The end rules are those of the table: the position holds, the velocity vanishes.
+    assert_eq!(add_on.step(1, &[0.0; 2], &mut Scratch::new()), [1.5, 0.0]);
+    assert!(add_on.guard().is_none() && add_on.report() == Report { next_tick: 1, ..Default::default() });
+    // A table in another order is followed by its names.
+    let swapped = [table.reference[1], table.reference[0]];
+    let signals = Channels { reference: &swapped, ..Channels::from(&table) };
+    add_on.bypass(signals).unwrap();
+    add_on.push([1.0, 2.0]).unwrap();
+    assert_eq!(add_on.finish(0, &[0.0; 2]), [2.0, 1.0]);
+    // What cannot be followed is refused, and nothing changes.
+    let unknown = [table.reference[0], table.reference[0], table.reference[1]];
+    let refused = [
+        (Channels { desired: &table.desired[1..], ..signals }, Refusal::Signal { signal: "reference", channel: 1 }),
+        (Channels { reference: &unknown, ..signals }, Refusal::Signal { signal: "reference", channel: 2 }),
+        (Channels { measured: &unknown, ..signals }, Refusal::Signal { signal: "measured", channel: 2 }),
+    ];
+    for (signals, refusal) in refused {
+        assert_eq!(add_on.bypass(signals), Err(refusal));
+    }
+    assert_eq!(add_on.finish(0, &[0.0; 2]), [2.0, 1.0]);
+}
+
+#[test]
+fn a_refused_model_and_a_refused_sample_change_nothing() {
+    let description = description(1);
+    let bytes = constant_model(description.clone(), [0.25, 0.5]);
+    let model = Model::from_bytes(&bytes).unwrap();
+    let table = table(&description);
+    let signals = Channels::from(&table);
+    let mut add_on = Cart::new(&model, signals, 100.0).unwrap();
+    add_on.switch(Lanes::BOTH);
+    add_on.push([1.0, 2.0]).unwrap();
+    assert_eq!(add_on.load(&model, signals, 50.0), Err(Refusal::Rate { model: 100.0, application: 50.0 }));
+    assert_eq!(Cart::check(&model, signals, 50.0), Err(Refusal::Rate { model: 100.0, application: 50.0 }));
+    assert_eq!(add_on.push([1.0, f32::NAN]), Err(NotFinite { channel: 1 }));
+    assert_eq!(add_on.push([f32::INFINITY, f32::NAN]), Err(NotFinite { channel: 0 }));
+    assert_eq!((add_on.next_tick(), add_on.desired(0)), (1, [1.0, 2.0]));
+    assert_eq!(add_on.step(0, &[0.0; 2], &mut Scratch::new()), [1.25, 2.5]);
+}
+
+#[test]
+fn a_reset_keeps_the_wanted_lanes_and_a_restart_their_fade() {
+    let mut description = description(1);
+    description.timing.fade_s = 0.04;
+    let bytes = constant_model(description.clone(), [0.25, 0.5]);
+    let model = Model::from_bytes(&bytes).unwrap();
+    let mut add_on = Cart::new(&model, &table(&description), 100.0).unwrap();
+    add_on.switch(Lanes { network: true, feedback: false });
+    let mut weight = |add_on: &mut Cart<'_>, tick| {
+        add_on.push([0.0; 2]).unwrap();
+        add_on.step(tick, &[0.0; 2], &mut Scratch::new());
+        add_on.report().network_weight
+    };
+    assert_eq!([0, 1, 2, 3].map(|tick| weight(&mut add_on, tick)), [0.25, 0.5, 0.75, 1.0]);
+    add_on.restart(20);
+    assert_eq!((weight(&mut add_on, 20), add_on.report().next_tick), (1.0, 21));
+    add_on.reset(0);
+    assert_eq!((weight(&mut add_on, 0), add_on.report().next_tick), (0.25, 1));
+}
