@@ -168,7 +168,8 @@ pub struct MonitorDescription {
     /// Reference ticks in a monitor tick.
     pub divisor: u16,
     /// RMS over all axes of the error that validation flights showed with the add-on, in the errors' unit.
-    pub promise: f32,
+    #[serde(alias = "promise")]
+    pub validated_rms: f32,
     /// Axes; their errors have one unit.
     pub axes: Vec<MonitorAxisDescription>,
 }

@@ -164,7 +164,7 @@ impl Train {
         let mut model = exported(&description)?;
         // What the guard judges by needs flights that the add-on flew; without a vehicle there are none.
         if let (Some(plant), Ok(mut monitor)) = (&origin.plant, monitor(&recipe, identification)) {
-            monitor.promise = promise(plant, &validation, &model, derived(seed, Purpose::Validation))?;
+            monitor.validated_rms = promise(plant, &validation, &model, derived(seed, Purpose::Validation))?;
             description.monitor = Some(monitor);
             model = exported(&description)?;
         }

@@ -141,7 +141,7 @@ pub fn build(recipe: &Recipe, plant: &Loop, seed: u64, progress: &mut dyn FnMut(
         let promised = |monitor: &MonitorDescription| {
             let model = encode(describe(lane))?;
             Ok::<_, BuildError>(MonitorDescription {
-                promise: promise(plant, validation, &model, flight_seed)?,
+                validated_rms: promise(plant, validation, &model, flight_seed)?,
                 ..monitor.clone()
             })
         };

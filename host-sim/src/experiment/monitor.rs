@@ -43,7 +43,7 @@ pub fn monitor(recipe: &Recipe, logs: &[FlightLog]) -> Result<MonitorDescription
         inputs: vec![axis, axis + 3],
         taps: taps.to_vec(),
     });
-    Ok(MonitorDescription { divisor: DIVISOR as u16, promise: 0.0, axes: axes.collect() })
+    Ok(MonitorDescription { divisor: DIVISOR as u16, validated_rms: 0.0, axes: axes.collect() })
 }
 
 /// Median over the validation flights of the RMS error with all lanes of a model, m: a few flights in which motors saturate do not

@@ -131,8 +131,8 @@ impl fmt::Display for InspectedNetwork {
 
 impl fmt::Display for InspectedMonitor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { axes, period_s, memory_s, promise, unit } = self;
-        write!(f, "{} axes, every {period_s} s, response of {memory_s} s, promised error {promise} {unit}", axes.len())
+        let Self { axes, period_s, memory_s, validated_rms, unit } = self;
+        write!(f, "{} axes, every {period_s} s, response of {memory_s} s, promised error {validated_rms} {unit}", axes.len())
     }
 }
 

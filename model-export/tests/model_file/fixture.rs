@@ -136,7 +136,7 @@ pub(crate) fn small_model(precision: Precision) -> Vec<u8> {
     let mut description = description(3);
     description.lane = Some(lane([vec![-0.5, 0.1], vec![-0.2, 0.0]], vec![0.3, 0.1], -0.2));
     let axis = MonitorAxisDescription { error: (0, 0), inputs: vec![0, 1], taps: vec![vec![0.1, 0.5, 0.3], vec![0.0, 0.2, 0.1]] };
-    description.monitor = Some(MonitorDescription { divisor: 5, promise: 0.01, axes: vec![axis] });
+    description.monitor = Some(MonitorDescription { divisor: 5, validated_rms: 0.01, axes: vec![axis] });
     encode(&description, Some(&network), precision, &rows).unwrap()
 }
 

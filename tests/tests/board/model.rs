@@ -69,7 +69,7 @@ pub(crate) fn file_at(divisor: u16, shape: &Shape, precision: Precision) -> Vec<
         }),
         monitor: Some(MonitorDescription {
             divisor: 5,
-            promise: 0.01,
+            validated_rms: 0.01,
             axes: (0..3).map(|axis| monitored(axis, &mut random)).collect(),
         }),
     };
