@@ -1,9 +1,10 @@
 //! Counterfactual monitor: what the error would be without a lane.
 //!
 //! *in* the loop's errors and what each lane contributed to the correction, at every reference tick; *out* whether a lane does
-//! harm; *never* a number that is not finite. Round calm flight the loop is linear: the error without a lane is e
-//! - G u, with the lane's contribution u and the response G of the measured channel to the correction, which the model stores
-//! ([`Monitor`]).
+//! harm; *never* a number that is not finite; *source* a linear model of the loop's response, identified from logs with dither.
+//!
+//! Round calm flight the loop is linear: the error without a lane is the error less G u, with the lane's contribution u and the
+//! response G of the measured channel to the correction, which the model stores ([`Monitor`]).
 //!
 //! The feedback lane answers for the error with it against that without it. What the network lane asks for does not depend on
 //! what is measured, or hardly, while the feedback lane would also answer to the network's mistakes: so the network is judged on

@@ -11,8 +11,8 @@
 //! 1. the inputs' codes are n · `input_code`, rounded to the nearest integer (halves to even), within ± the first layer's
 //!    [`input_limit`](crate::format::LayerLayout::input_limit);
 //! 2. a hidden layer's accumulator a, exact in 32 bits, becomes c = ⌊a · multiplier / 2³² + ½⌋. ReLU: c within 0..=L, L being the
-//! next layer's limit. Linear: c within ±L. Tanh: c within 16 bits is a pre-activation in units of 1/[`TANH_INPUT_ONE`],
-//! [`tanh_code`] makes a code of it, of which L is 1;
+//!    next layer's limit. Linear: c within ±L. Tanh: c within 16 bits is a pre-activation in units of 1/[`TANH_INPUT_ONE`],
+//!    [`tanh_code`] makes a code of it, of which L is 1;
 //! 3. the last layer's accumulators, as f32, times the scales of their rows.
 
 mod float;
