@@ -1,8 +1,9 @@
 //! The add-on: corrects the references of any stable loop.
 //!
 //! *in* desired channels (pushed ahead of time) and measured channels, at every reference tick; *out* the reference channels;
-//! *never* a correction beyond the model's limits and slew, never any change of the desired reference when both lanes are off, be it by the
-//! user or by the [guard](crate::guard); *source* Zhou 2017, Fig. 1. What differs: the correction is ramped between sub-rate ticks, and a feedback lane adds to it.
+//! *never* a correction beyond the model's limits and slew, never any change of the desired reference when both lanes are off, be
+//! it by the user or by the [guard](crate::guard); *source* Zhou 2017, Fig. 1. What differs: the correction is ramped between
+//! sub-rate ticks, and a feedback lane adds to it.
 
 mod correction;
 mod fade;
@@ -31,9 +32,9 @@ pub use crate::{format::HISTORY, lanes::Lanes};
 
 /// Adapter for a loop with `D` desired, `M` measured and `R` reference channels.
 ///
-/// A reference tick is [`Adapter::begin`] and [`Adapter::finish`]. At a sub-rate tick the first gives the [`Job`] of evaluating the network,
-/// whose [`Inference`] is [delivered](Adapter::deliver): between the two ([`Adapter::step`] does it all), or, by a task that the
-/// control loop interrupts, until the next reference tick ([`Adapter::defer`]).
+/// A reference tick is [`Adapter::begin`] and [`Adapter::finish`]. At a sub-rate tick the first gives the [`Job`] of evaluating
+/// the network, whose [`Inference`] is [delivered](Adapter::deliver): between the two ([`Adapter::step`] does it all), or, by a
+/// task that the control loop interrupts, until the next reference tick ([`Adapter::defer`]).
 #[derive(Debug)]
 pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
     model: Option<&'m Model<'m>>,
@@ -63,8 +64,8 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
 }
 
 impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
-    /// An adapter without a model, which corrects nothing: all zeros. It is 6 KB large, so a microcontroller has it in a static, or in
-    /// something that is one, and [loads](Adapter::load) it there.
+    /// An adapter without a model, which corrects nothing: all zeros. It is 6 KB large, so a microcontroller has it in a static,
+    /// or in something that is one, and [loads](Adapter::load) it there.
     pub const fn empty() -> Self {
         Self {
             model: None,
@@ -74,7 +75,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             references: History::new([EndRule::Hold; R], 0),
             ramp: Ramp::EMPTY,
             deferred: false,
-            feedback: Feedback::REST,
+            feedback: Feedback::EMPTY,
             lanes: Lanes::NONE,
             network_weight: 0.0,
             feedback_weight: 0.0,
@@ -86,7 +87,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         }
     }
 
-    /// Ties a model to an application whose signals are `table`, whose references run at `rate_hz` and whose preview keeps
+    /// Loads a model into an application whose signals are `table`, whose references run at `rate_hz` and whose preview keeps
     /// `capacity` samples. Both lanes are off.
     ///
     /// # Errors
@@ -118,7 +119,8 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         Ok(())
     }
 
-    /// Makes this, in its place, what [`Adapter::new`] makes of a model that passes [`Adapter::check`]. With another one it is as safe, and of no use.
+    /// Makes this, in its place, what [`Adapter::new`] makes of a model that passes [`Adapter::check`]. With another one it is as
+    /// safe, and of no use.
     pub fn load(&mut self, model: &'m Model<'m>, table: &Channels<'_>) {
         self.model = Some(model);
         self.guard.load(GuardSettings::default(), model.card().timing.reference_rate_hz);
@@ -145,7 +147,8 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         Ok(())
     }
 
-    /// Forgets everything but the model and its guard's settings, also the counts: as it was when the model came. Both lanes are off.
+    /// Forgets everything but the model and its guard's settings, also the counts: as it was when the model came. Both lanes are
+    /// off.
     pub fn restart(&mut self) {
         self.reset();
         self.ramp = Ramp::EMPTY;
@@ -178,7 +181,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.guard.switched(lanes);
     }
 
-    /// Which lanes the guard lets act, and its evidence.
+    /// Which lanes the guard lets act, and its counterfactual monitor.
     pub fn guard(&self) -> Option<&Guard> {
         self.model.map(|_| &self.guard)
     }
@@ -247,8 +250,8 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.finish(tick, preview, measured)
     }
 
-    /// First part of a reference tick: takes the inference that is due, remembers what was measured and, at a sub-rate tick of the network
-    /// lane, gives the job of evaluating the network.
+    /// First part of a reference tick: takes the inference that is due, remembers what was measured and, at a sub-rate tick of
+    /// the network lane, gives the job of evaluating the network.
     pub fn begin<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>, measured: &[f32; M]) -> Option<Job> {
         let mut job = Job::EMPTY;
         self.begin_into(tick, preview, measured, &mut job).then_some(job)
@@ -263,8 +266,8 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         if tick.rem_euclid(divisor) != 0 {
             return false;
         }
-        // Histories start anew with the first tick that is seen and after a gap; the past reference is then the one that the loop would
-        // have got without corrections.
+        // Histories start anew with the first tick that is seen and after a gap; the past reference is then the one that the loop
+        // would have got without corrections.
         let sub_tick = tick.div_euclid(divisor);
         if self.references.next_tick() != sub_tick {
             self.measured.restart([EndRule::Hold; M], sub_tick);
@@ -303,8 +306,9 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.finish_through(tick, preview, measured, |_| ())
     }
 
-    /// [`Adapter::finish`] in which what the feedback lane asks for on each axis, in the output's unit, goes through `path` on its way to the
-    /// bounds, unknown to the lane: in flight the identity, in a simulator what a robustness study asks (another loop gain).
+    /// [`Adapter::finish`] in which what the feedback lane asks for on each axis, in the output's unit, goes through `path` on
+    /// its way to the bounds, unknown to the lane: in flight the identity, in a simulator what a robustness study asks (another
+    /// loop gain).
     #[inline]
     pub fn finish_through<const N: usize>(
         &mut self,
@@ -324,7 +328,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         }
         let network = self.ramp.value(interpolation, tick.rem_euclid(divisor), divisor);
         let Verdict { allowed, handover_step } = self.guard.tick(&Observation {
-            lane: card.lane.as_ref(),
+            lane: card.feedback.as_ref(),
             monitor: model.monitor(),
             wanted: self.lanes,
             last: self.acted.then_some(&self.outcome),
@@ -334,15 +338,15 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             age: self.age,
         });
         // The network lane has a value from its first sub-rate tick on: a fade that began before would end in a step.
-        let present = Lanes { network: self.ramp.current() && model.network().is_some(), feedback: model.lane().is_some() };
+        let present = Lanes { network: self.ramp.current() && model.network().is_some(), feedback: model.feedback().is_some() };
         let fade = Fade::new(card.timing.fade_ticks, handover_step);
         self.network_weight = fade.next(self.network_weight, self.lanes.network, allowed.network, present.network);
         self.feedback_weight = fade.next(self.feedback_weight, self.lanes.feedback, allowed.feedback, present.feedback);
         let errors = feedback::errors(model, tick, preview, measured);
-        let engaged = allowed.feedback && self.feedback_weight > 0.0;
+        let active = allowed.feedback && self.feedback_weight > 0.0;
         let wanted = Wanted {
             network,
-            feedback: self.feedback.step(model, tick, preview, &errors, engaged),
+            feedback: self.feedback.step(model, tick, preview, &errors, active),
             network_weight: self.network_weight,
             feedback_weight: self.feedback_weight,
         };
@@ -355,11 +359,11 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.feedback.applied(model, &applied);
         self.acted = acting || self.lanes != Lanes::NONE;
         if self.acted {
-            (self.outcome.engaged, self.outcome.asked) = (engaged, wanted.feedback);
+            (self.outcome.active, self.outcome.asked) = (active, wanted.feedback);
             self.outcome.errors = feedback::monitored(model, tick, preview, measured, &errors);
         }
         if self.feedback_weight == 0.0 {
-            self.feedback.release();
+            self.feedback.clear_integrals();
         }
         if tick.rem_euclid(divisor) == 0 {
             self.references.push(reference);

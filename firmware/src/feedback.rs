@@ -2,13 +2,13 @@
 //!
 //! *in* tracking errors, each measured against what was desired at the time of the measurement, at the reference's own rate;
 //! *out* a bounded correction for each axis; *never* more than the two clamps added, whatever comes in;
-//! *source* linear-quadratic gain on an ARX model of the closed loop whose past inputs and outputs are its state. What differs: the
-//! integral's share is split off in its steady state, so that fast and slow part can be clamped apart.
+//! *source* linear-quadratic gain on an ARX model of the closed loop whose past inputs and outputs are its state. What differs:
+//! the integral's share is split off in its steady state, so that fast and slow part can be clamped apart.
 
 use heapless::Vec;
 
 use crate::{
-    format::{Blob, Floats, LaneAxis, LaneLayout, MAX_AXES, MAX_ERRORS, MAX_LAGS, Refusal},
+    format::{Blob, FeedbackAxis, FeedbackLayout, Floats, MAX_AXES, MAX_ERRORS, MAX_LAGS, Refusal},
     math::{abs, clamp, finite_or_zero},
 };
 
@@ -18,7 +18,7 @@ pub const PROBE_TICKS: u32 = 64;
 /// One checked axis.
 #[derive(Debug)]
 pub struct Axis<'a> {
-    layout: LaneAxis,
+    layout: FeedbackAxis,
     errors: Floats<'a>,
     outputs: Floats<'a>,
     /// Steady-state value of the output for an integral of 1.
@@ -39,29 +39,29 @@ impl<'a> Lane<'a> {
     ///
     /// # Errors
     /// With the section or value that is wrong.
-    pub fn new(layout: &LaneLayout, blob: &Blob<'a>) -> Result<Self, Refusal> {
+    pub fn new(layout: &FeedbackLayout, blob: &Blob<'a>) -> Result<Self, Refusal> {
         let mut lane = Self::empty(layout);
         lane.fill(layout, blob)?;
         Ok(lane)
     }
 
     /// [`Lane::new`] in `place`. After an error there may be a part of a lane.
-    pub(crate) fn load(place: &mut Option<Self>, layout: &LaneLayout, blob: &Blob<'a>) -> Result<(), Refusal> {
+    pub(crate) fn load(place: &mut Option<Self>, layout: &FeedbackLayout, blob: &Blob<'a>) -> Result<(), Refusal> {
         Self::begin(place, layout).fill(layout, blob)
     }
 
     #[inline(never)]
-    fn begin<'p>(place: &'p mut Option<Self>, layout: &LaneLayout) -> &'p mut Self {
+    fn begin<'p>(place: &'p mut Option<Self>, layout: &FeedbackLayout) -> &'p mut Self {
         place.insert(Self::empty(layout))
     }
 
     /// A lane whose axes are yet to come.
-    fn empty(layout: &LaneLayout) -> Self {
+    fn empty(layout: &FeedbackLayout) -> Self {
         Self { lags: layout.lags.into(), axes: Vec::new() }
     }
 
     #[inline(never)]
-    fn fill(&mut self, layout: &LaneLayout, blob: &Blob<'a>) -> Result<(), Refusal> {
+    fn fill(&mut self, layout: &FeedbackLayout, blob: &Blob<'a>) -> Result<(), Refusal> {
         let lags = self.lags;
         for axis in &layout.axes {
             let count = axis.errors.len() * lags;
@@ -93,7 +93,7 @@ impl<'a> Lane<'a> {
 
 impl Axis<'_> {
     /// Index of the corrected output, and the errors' (measured, desired) channels.
-    pub fn layout(&self) -> &LaneAxis {
+    pub fn layout(&self) -> &FeedbackAxis {
         &self.layout
     }
 }
@@ -108,8 +108,8 @@ pub struct AxisState {
 }
 
 impl AxisState {
-    /// At rest.
-    pub const REST: Self =
+    /// Nothing seen yet: all zeros.
+    pub const EMPTY: Self =
         Self { errors: [[0.0; MAX_LAGS]; MAX_ERRORS], outputs: [0.0; MAX_LAGS], integral: 0.0, clamped: false };
 
     /// Whether the fast part was at its clamp in the last tick.
@@ -118,8 +118,9 @@ impl AxisState {
     }
 
     /// Takes this tick's errors (in the order of the layout) and returns the lane's output on this axis.
-    /// `authority` (0..=1) scales the fast clamp and what is integrated; `dt` is the reference's period, s. While not `engaged` the lags stay warm and the integral stands still: a lane that is faded
-    /// out must not lose its slow part at once; [`AxisState::release`] empties it afterwards.
+    /// `authority` (0..=1) scales the fast clamp and what is integrated; `dt` is the reference's period, s. While not `active`
+    /// the lags are filled and the integral stands still: a lane that is faded out must not lose its slow part at once;
+    /// [`AxisState::clear_integral`] empties it afterwards.
     pub fn step(
         &mut self,
         lane: &Lane<'_>,
@@ -127,7 +128,7 @@ impl AxisState {
         errors: [f32; MAX_ERRORS],
         authority: f32,
         dt: f32,
-        engaged: bool,
+        active: bool,
     ) -> f32 {
         let lags = lane.lags;
         for (lagged, error) in self.errors.iter_mut().zip(errors) {
@@ -147,9 +148,9 @@ impl AxisState {
         let bounded = clamp(fast, -fast_limit, fast_limit);
         self.clamped = bounded != fast;
         let increment = self.errors[0][0] * dt * authority;
-        // Only its own clamp stops the integral: a constant disturbance larger than the fast clamp must still be absorbed. The integral
-        // itself is bounded, so that neither a long nor a single huge error can wind it up.
-        if engaged {
+        // Only its own clamp stops the integral: a constant disturbance larger than the fast clamp must still be absorbed. The
+        // integral itself is bounded, so that neither a long nor a single huge error can wind it up.
+        if active {
             let bound = axis.integral_bound;
             self.integral = clamp(self.integral + finite_or_zero(increment), -bound, bound);
         }
@@ -162,7 +163,7 @@ impl AxisState {
     }
 
     /// Empties the integral: the lane is faded out.
-    pub fn release(&mut self) {
+    pub fn clear_integral(&mut self) {
         self.integral = 0.0;
     }
 }
@@ -201,7 +202,7 @@ pub fn probe(lane: &Lane<'_>, dt: f32) -> [f32; MAX_AXES] {
     };
     let mut results = [0.0; MAX_AXES];
     for (axis, result) in lane.axes.iter().zip(&mut results) {
-        let mut state = AxisState::REST;
+        let mut state = AxisState::EMPTY;
         for _ in 0..PROBE_TICKS {
             *result = state.step(lane, axis, core::array::from_fn(|_| draw()), 1.0, dt, true);
             state.applied(lane, *result);

@@ -1,13 +1,13 @@
 //! The guard: decides, beside what the user wants, which lanes may act.
 //!
-//! *in* what is wrong at each reference tick: inputs, inferences, corrections, evidence; *out* the lanes that may act, counts by reason and
-//! by lane; *never* more than one trip of a lane in a hold time, never a lane on its way back while its cause lasts; *source* ours, for a
-//! Simplex architecture (Sha 2001): a simple loop that is trusted, a complex one that is watched.
+//! *in* what is wrong at each reference tick: inputs, inferences, corrections, errors; *out* the lanes that may act, counts by
+//! reason and by lane; *never* more than one trip of a lane in a hold time, never a lane on its way back while its cause lasts;
+//! *source* the Simplex architecture (Sha 2001): a simple loop that is trusted, a complex one that is watched.
 //!
-//! A lane that trips is handed over by fade, and comes back by fade when its cause has been absent for the hold time. A lane that the
-//! evidence has spoken against several times stays off until it is armed again.
+//! A lane that trips is handed over by fade, and comes back by fade when its cause has been absent for the hold time. A lane that
+//! the counterfactual monitor has tripped several times stays off until it is armed again.
 
-mod evidence;
+mod counterfactual;
 mod monitor;
 mod observation;
 mod oscillation;
@@ -17,13 +17,13 @@ mod watch;
 
 use crate::{lanes::Lanes, math::abs};
 
-pub use evidence::Evidence;
+pub use counterfactual::Counterfactual;
 pub use monitor::Monitor;
 pub(crate) use observation::{Features, Observation, Outcome, Shares, Verdict};
 use oscillation::Oscillation;
 pub use settings::GuardSettings;
 pub use trip::{Trip, Trips};
-use watch::{Watch, leak};
+use watch::{Watch, ewma_gain};
 
 /// Decides which lanes may act.
 #[derive(Clone, Debug)]
@@ -38,7 +38,7 @@ pub struct Guard {
     /// Recent share of ticks in which each lane asked for more than the bounds let pass.
     excess: [f32; 2],
     oscillation: Oscillation,
-    evidence: Evidence,
+    counterfactual: Counterfactual,
     trips: Trips,
 }
 
@@ -52,7 +52,7 @@ impl Guard {
         outside: 0,
         excess: [0.0; 2],
         oscillation: Oscillation::NONE,
-        evidence: Evidence::NONE,
+        counterfactual: Counterfactual::NONE,
         trips: Trips::NONE,
     };
 
@@ -85,7 +85,7 @@ impl Guard {
 
     /// Empties all that was learned of the lanes' doing.
     fn clear(&mut self) {
-        self.evidence.reset();
+        self.counterfactual.reset();
         self.excess = [0.0; 2];
         self.oscillation = Oscillation::NONE;
     }
@@ -100,9 +100,9 @@ impl Guard {
         self.trips
     }
 
-    /// The evidence so far.
-    pub fn evidence(&self) -> &Evidence {
-        &self.evidence
+    /// The counterfactual monitor: errors with and without the lanes. It has seen every reference tick but the last.
+    pub fn counterfactual(&self) -> &Counterfactual {
+        &self.counterfactual
     }
 
     /// Lets every lane act again at once; what is still wrong will trip it again.
@@ -135,27 +135,28 @@ impl Guard {
         if self.settings.enabled {
             self.judge(seen);
         }
-        let handover_step = leak(1.0 / (self.settings.handover_s * self.rate_hz));
+        let handover_step = ewma_gain(1.0 / (self.settings.handover_s * self.rate_hz));
         Verdict { allowed: self.allowed(seen.wanted), handover_step }
     }
 
-    /// What the lanes did in the last reference tick. If none acted, or ticks are missing since, all that was learned is forgotten.
+    /// What the lanes did in the last reference tick. If none acted, or ticks are missing since, all that was learned is
+    /// forgotten.
     fn learn(&mut self, seen: &Observation<'_>) {
         let Some(last) = seen.last else {
             self.clear();
             return;
         };
         let settings = &self.settings;
-        let decay = leak(1.0 / (settings.saturated_s * self.rate_hz));
+        let decay = ewma_gain(1.0 / (settings.saturated_s * self.rate_hz));
         for (share, excess) in self.excess.iter_mut().zip(last.excess) {
             *share += (f32::from(u8::from(excess)) - *share) * decay;
         }
-        match seen.lane.filter(|_| last.engaged) {
+        match seen.lane.filter(|_| last.active) {
             Some(lane) => self.oscillation.observe(lane, &last.asked, settings, self.rate_hz),
             None => self.oscillation = Oscillation::NONE,
         }
         if let Some(monitor) = seen.monitor {
-            self.evidence.observe(monitor, &last.errors, &last.shares, settings, self.rate_hz);
+            self.counterfactual.observe(monitor, &last.errors, &last.shares, settings, self.rate_hz);
         }
     }
 
@@ -166,7 +167,7 @@ impl Guard {
         let outside = self.outside >= settings.envelope_ticks.max(1);
         let late = seen.late >= settings.late_in_a_row.max(1);
         let [network_excess, feedback_excess] = self.excess.map(|share| share > settings.saturated_share);
-        let [network_harms, feedback_harms] = self.evidence.harmful();
+        let [network_harms, feedback_harms] = self.counterfactual.harmful();
         let swings = self.oscillation.present(settings);
         let first = |causes: [(bool, Trip); 7]| causes.into_iter().find(|(present, _)| *present).map(|(_, trip)| trip);
         let cause = |own: [bool; 5]| {
@@ -178,7 +179,7 @@ impl Guard {
                 (late, Trip::Late),
                 (swings, Trip::Oscillation),
                 (excess, Trip::Saturated),
-                (harms, Trip::Evidence),
+                (harms, Trip::Counterfactual),
             ])
         };
         let network = cause([outside, late, false, network_excess, network_harms]).filter(|_| seen.wanted.network);

@@ -1,4 +1,7 @@
 //! The two lanes, on or off.
+//!
+//! *in* the user's wish or the guard's verdict; *out* a switch for each lane; *never* a third lane; *source* the add-on's
+//! structure in the crate's first page.
 
 use serde::{Deserialize, Serialize};
 

@@ -9,8 +9,8 @@ pub fn sqrt(x: f32) -> f32 {
     libm::sqrtf(x)
 }
 
-/// Sine and cosine of an angle in rad, to 1.2e-7 for angles up to 8,192 rad, beyond which they only stay within ±1. In f32 throughout:
-/// `libm`'s reduce the angle in f64, which the Cortex-M4F computes in software (6 KB and 1,200 instructions).
+/// Sine and cosine of an angle in rad, to 1.2e-7 for angles up to 8,192 rad, beyond which they only stay within ±1. In f32
+/// throughout: `libm`'s reduce the angle in f64, which the Cortex-M4F computes in software (6 KB and 1,200 instructions).
 ///
 /// *source* Cody and Waite's reduction and the polynomials of Moshier's Cephes (`sinf.c`).
 pub fn sin_cos(x: f32) -> (f32, f32) {

@@ -20,7 +20,7 @@ pub struct Model<'a> {
     card: Card<'a>,
     blob: Blob<'a>,
     network: Option<Network<'a>>,
-    lane: Option<Lane<'a>>,
+    feedback: Option<Lane<'a>>,
     monitor: Option<Monitor<'a>>,
     envelope: (Floats<'a>, Floats<'a>),
     bounds: Bounds<'a>,
@@ -29,11 +29,11 @@ pub struct Model<'a> {
 
 impl<'a> Model<'a> {
     /// No model: where [`Model::load_into`] puts one.
-    pub const VACANT: Self = Self {
+    pub const EMPTY: Self = Self {
         card: Card::EMPTY,
         blob: Blob::new(&[]),
         network: None,
-        lane: None,
+        feedback: None,
         monitor: None,
         envelope: (Floats::EMPTY, Floats::EMPTY),
         bounds: Bounds::EMPTY,
@@ -45,19 +45,19 @@ impl<'a> Model<'a> {
     /// # Errors
     /// A [`Refusal`] that names what is wrong: header, check sum, card, shapes, indices, values, probes.
     pub fn from_bytes(bytes: &'a [u8]) -> Result<Self, Refusal> {
-        let mut model = Self::VACANT;
+        let mut model = Self::EMPTY;
         model.load(bytes, &mut Scratch::new())?;
         Ok(model)
     }
 
-    /// [`Model::from_bytes`] into `place`, with the caller's working memory for the probes: for a model in a static, since 3 KB and 2 KB are
-    /// much for the stack of a microcontroller. After a refusal it has neither network nor lane.
+    /// [`Model::from_bytes`] into `place`, with the caller's working memory for the probes: for a model in a static, since 3 KB
+    /// and 2 KB are much for the stack of a microcontroller. After a refusal it has neither network nor feedback lane.
     ///
     /// # Errors
     /// As [`Model::from_bytes`].
     pub fn load_into<'p>(place: &'p mut Self, bytes: &'a [u8], scratch: &mut Scratch) -> Result<&'p Self, Refusal> {
         if let Err(refusal) = place.load(bytes, scratch) {
-            (place.network, place.lane) = (None, None);
+            (place.network, place.feedback) = (None, None);
             return Err(refusal);
         }
         Ok(place)
@@ -66,20 +66,20 @@ impl<'a> Model<'a> {
     /// Stage by stage, none of which leaves anything on the stack for the next.
     #[inline(never)]
     fn load(&mut self, bytes: &'a [u8], scratch: &mut Scratch) -> Result<(), Refusal> {
-        let Self { card, blob, network, lane, monitor, envelope, bounds, checksum } = self;
+        let Self { card, blob, network, feedback, monitor, envelope, bounds, checksum } = self;
         load_card(bytes, card, blob)?;
         validate::card(card)?;
-        (*network, *lane, *monitor) = (None, None, None);
+        (*network, *feedback, *monitor) = (None, None, None);
         if let Some(layout) = &card.network {
             Network::load(network, layout, blob, card.features.len(), card.outputs.len())?;
         }
-        if let Some(layout) = &card.lane {
-            Lane::load(lane, layout, blob)?;
+        if let Some(layout) = &card.feedback {
+            Lane::load(feedback, layout, blob)?;
         }
         load_rest(card, blob, envelope, monitor, bounds)?;
         let checked = network.as_ref().map(|network| (network, &*envelope, &*bounds));
         validate::network_probes(card, blob, checked, scratch)?;
-        if let Some(lane) = lane {
+        if let Some(lane) = feedback {
             validate::lane_probe(card, blob, lane)?;
         }
         *checksum = file::checksum(bytes);
@@ -102,11 +102,11 @@ impl<'a> Model<'a> {
     }
 
     /// The feedback lane's map.
-    pub fn lane(&self) -> Option<&Lane<'a>> {
-        self.lane.as_ref()
+    pub fn feedback(&self) -> Option<&Lane<'a>> {
+        self.feedback.as_ref()
     }
 
-    /// The loop's response to corrections; without it the guard cannot judge by evidence.
+    /// The loop's response to corrections; without it the guard has no counterfactual monitor.
     pub fn monitor(&self) -> Option<&Monitor<'a>> {
         self.monitor.as_ref()
     }

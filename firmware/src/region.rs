@@ -1,12 +1,14 @@
 //! Several modules for several operating regions: which one acts, and how one hands over to the next.
 //!
-//! *in* one measured channel or feature at every reference tick, and what each module wants; *out* a share for each module, and their mean;
-//! *never* a share that changes by more than one over the fade time in a tick, two changes of region closer together in the channel than the
-//! hysteresis, nor another region for a value that is not a number; *source* Zhou 2017, section III-A: relative degrees are local, "having
-//! multiple DNN modules for different operating regions may be required". The paper says neither when nor how to switch: that is ours.
+//! *in* one measured channel or feature at every reference tick, and what each module wants; *out* a share for each module, and
+//! their mean; *never* a share that changes by more than one over the fade time in a tick, two changes of region closer together
+//! in the channel than the hysteresis, nor another region for NaN; *source* Zhou 2017, section III-A: relative degrees are local,
+//! "having multiple DNN modules for different operating regions may be required". The paper says neither when nor how to switch:
+//! that is ours.
 //!
-//! Each module is an [`Adapter`](crate::adapter::Adapter) (or a network) of its own, trained on logs of its region and a fade's width around it.
-//! All adapters are stepped at every tick, so that each has its history when its turn comes; their references are mixed:
+//! Each module is an [`Adapter`](crate::adapter::Adapter) (or a network) of its own, trained on logs of its region and a fade's
+//! width around it. All adapters are stepped at every tick, so that each has its history when its turn comes; their references
+//! are mixed:
 //!
 //! ```
 //! use impromptu_firmware::region::Selector;
@@ -24,6 +26,7 @@ use crate::math::clamp;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub enum RegionError {
     /// No region at all.
     Empty,
@@ -32,7 +35,7 @@ pub enum RegionError {
         /// The later one of the two.
         region: usize,
     },
-    /// A hysteresis that is negative or not a number, or wider than half of a region.
+    /// A hysteresis that is negative or NaN, or wider than half of a region.
     Hysteresis,
 }
 
@@ -66,8 +69,9 @@ pub struct Selector<const N: usize> {
 }
 
 impl<const N: usize> Selector<N> {
-    /// Regions by the value from which each holds, rising; the first one holds below as well. A region is left when the channel is
-    /// `hysteresis` (in its unit) beyond its border, and the modules then change over in `fade_ticks` reference ticks, 0 or 1 for at once.
+    /// Regions by the value from which each holds, rising; the first one holds below as well. A region is left when the channel
+    /// is `hysteresis` (in its unit) beyond its border, and the modules then change over in `fade_ticks` reference ticks, 0 or 1
+    /// for at once.
     ///
     /// # Errors
     /// If starts do not rise or the hysteresis does not fit into the regions.
@@ -104,7 +108,7 @@ impl<const N: usize> Selector<N> {
         self.mix(wanted)
     }
 
-    /// Takes the channel's value of this reference tick. The first number decides at once; no number changes nothing but the fade.
+    /// Takes the channel's value of this reference tick. The first number decides at once; NaN changes nothing but the fade.
     pub fn select(&mut self, channel: f32) {
         if !channel.is_nan() {
             match self.active {
@@ -216,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_wanted_before_the_first_number_and_no_number_keeps_the_region() {
+    fn nothing_is_wanted_before_the_first_number_and_nan_keeps_the_region() {
         let mut selector = two(0.1, 4);
         assert_eq!(selector.step(f32::NAN, &[[5.0], [6.0]]), [0.0]);
         assert_eq!(selector.step(3.0, &[[5.0], [6.0]]), [6.0]);
@@ -273,7 +277,8 @@ mod tests {
 
         #[test]
         fn far_inside_a_region_its_module_comes_out_bit_by_bit(
-            wanted in proptest::array::uniform4(-1e3..1e3f32), channel in proptest::collection::vec(1.5..9.0f32, 1..50), start in -3.0..3.0f32
+            wanted in proptest::array::uniform4(-1e3..1e3f32),
+            channel in proptest::collection::vec(1.5..9.0f32, 1..50), start in -3.0..3.0f32
         ) {
             let mut selector = two(0.1, 8);
             selector.select(start);

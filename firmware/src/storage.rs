@@ -1,11 +1,12 @@
 //! Models in flash, which an upload replaces without a new program.
 //!
-//! *in* two [`Slot`]s of NOR flash; *out* the newest model that this machine flies, in place, and an [`Uploader`] for the other slot;
-//! *never*, wherever the power is cut, none where there was one, or a mix of two; *source* two slots with a commit record written last.
+//! *in* two [`Slot`]s of NOR flash; *out* the newest model that this machine flies, in place, and an [`Uploader`] for the other
+//! slot; *never*, wherever the power is cut, none where there was one, or a mix of two; *source* two slots with a commit record
+//! written last.
 //!
-//! A slot is a [`Header`] and behind it the model file. An upload erases the slot that does not fly, writes the file, checks it as it
-//! stands in the flash, and last writes the header, whose own CRC tells whether it is whole: until then the old model is the newest one. The
-//! slot that flies is borrowed by its model, so no code can write to it.
+//! A slot is a [`Header`] and behind it the model file. An upload erases the slot that does not fly, writes the file, checks it
+//! as it stands in the flash, and last writes the header, whose own CRC tells whether it is whole: until then the old model is
+//! the newest one. The slot that flies is borrowed by its model, so no code can write to it.
 //!
 //! ```
 //! use impromptu_firmware::{network::Scratch, storage::{self, Arming, RamFlash}};
@@ -26,9 +27,10 @@
 //! # Ok::<(), storage::StorageError>(())
 //! ```
 //!
-//! The crates that keep data in NOR flash do not serve: `sequential-storage` 8 and `ekv` 1 copy an item out of pages into a buffer, where
-//! the kernels read a model of up to 100 KB in place, contiguous and on a boundary of 16 bytes. The former's items are shorter than 64 KB, the
-//! latter's records are cut into chunks; both are async. Only the traits of `embedded-storage` are used.
+//! The crates that keep data in NOR flash do not serve: `sequential-storage` 8 and `ekv` 1 copy an item out of pages into a
+//! buffer, where the kernels read a model of up to 100 KB in place, contiguous and on a boundary of 16 bytes. The former's items
+//! are shorter than 64 KB, the latter's records are cut into chunks; both are async. Only the traits of `embedded-storage` are
+//! used.
 
 mod error;
 mod header;
@@ -43,11 +45,11 @@ pub use error::{Operation, StorageError};
 pub use header::{HEADER, Header, MAGIC, Sequence, VERSION};
 pub use ram::RamFlash;
 pub use slot::Slot;
-pub use stored::{Place, Stored, Survey, survey};
+pub use stored::{SlotIndex, Stored, Survey, survey};
 pub use uploader::{Arming, Uploader};
 
-/// Start-up: the newest model that is intact and passes `check` (signals, rate, preview of the application), and an uploader for the slot
-/// that it does not lie in.
+/// Start-up: the newest model that is intact and passes `check` (signals, rate, preview of the application), and an uploader for
+/// the slot that it does not lie in.
 pub fn open<'a, S: Slot>(
     slots: &'a mut [S; 2],
     check: impl Fn(&Model<'_>) -> Result<(), Refusal>,
@@ -56,8 +58,8 @@ pub fn open<'a, S: Slot>(
     let found = flies.is_some();
     let [first, second] = slots;
     let (kept, spare) = match spare {
-        Place::First => (&*second, first),
-        Place::Second => (&*first, second),
+        SlotIndex::First => (&*second, first),
+        SlotIndex::Second => (&*first, second),
     };
     let stored = if found { Stored::read(kept.bytes()).ok() } else { None };
     (stored, Uploader::new(spare, sequence))

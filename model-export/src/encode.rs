@@ -3,7 +3,7 @@
 use impromptu_firmware::{
     feedback,
     model::{
-        self, Arithmetic, Authority, Card, Channel, LaneAxis, LaneLayout, LayerLayout, Model, MonitorAxis, MonitorLayout,
+        self, Arithmetic, Authority, Card, Channel, FeedbackAxis, FeedbackLayout, LayerLayout, Model, MonitorAxis, MonitorLayout,
         NetworkLayout, Probes, Refusal, Section, SignalTable, file,
     },
     network::{self, Scratch, kernel::Width},
@@ -143,7 +143,7 @@ fn channels<'a, const N: usize>(
     bounded(&borrowed, what)
 }
 
-fn lane(description: &Description, blob: &mut BlobWriter) -> Result<Option<LaneLayout>, ExportError> {
+fn lane(description: &Description, blob: &mut BlobWriter) -> Result<Option<FeedbackLayout>, ExportError> {
     let Some(lane) = &description.feedback_lane else { return Ok(None) };
     let lags = lane.axes.first().map_or(0, |axis| axis.output_coefficients.len());
     within(lags, "lags of the feedback lane", model::MAX_LAGS)?;
@@ -158,7 +158,7 @@ fn lane(description: &Description, blob: &mut BlobWriter) -> Result<Option<LaneL
             matching("lags of the feedback lane (as many as the first axis' own)", lags, found)?;
         }
         let coefficients = axis.error_coefficients.iter().flatten().chain(&axis.output_coefficients).copied();
-        axes.push(LaneAxis {
+        axes.push(FeedbackAxis {
             output: axis.output,
             errors: bounded(&axis.errors, "errors of a lane axis")?,
             coefficients: blob.floats(coefficients),
@@ -173,7 +173,7 @@ fn lane(description: &Description, blob: &mut BlobWriter) -> Result<Option<LaneL
         error_scale: lane.authority.error_scale,
         decay: lane.authority.decay,
     };
-    Ok(Some(LaneLayout { lags: lags as u8, axes: bounded(&axes, "lane axes")?, authority, margins: lane.margins }))
+    Ok(Some(FeedbackLayout { lags: lags as u8, axes: bounded(&axes, "lane axes")?, authority, margins: lane.margins }))
 }
 
 fn monitor(description: &Description, blob: &mut BlobWriter) -> Result<Option<MonitorLayout>, ExportError> {
@@ -193,7 +193,7 @@ fn monitor(description: &Description, blob: &mut BlobWriter) -> Result<Option<Mo
         });
     }
     let axes = bounded(&axes, "monitor axes")?;
-    Ok(Some(MonitorLayout { divisor: monitor.divisor, taps: taps as u8, promise: monitor.validated_rms, axes }))
+    Ok(Some(MonitorLayout { divisor: monitor.divisor, taps: taps as u8, validated_rms: monitor.validated_rms, axes }))
 }
 
 /// The bytes of a model file. `calibration` are rows of features in physical units: ranges of the integer network and probes come
@@ -255,7 +255,7 @@ pub fn encode(
         features: bounded(&description.features, "features")?,
         outputs: bounded(&description.outputs, "outputs")?,
         network,
-        lane,
+        feedback: lane,
         monitor,
         envelope: blob.floats(minima.chain(maxima)),
         bounds: Section::default(),
@@ -264,17 +264,17 @@ pub fn encode(
     if let Some(float) = float {
         card.bounds = blob.floats(output_bounds(&card, &blob, float, &description.envelope)?);
     }
-    let lane_outputs = card.lane.as_ref().map_or(0, |lane| lane.axes.len());
+    let lane_outputs = card.feedback.as_ref().map_or(0, |lane| lane.axes.len());
     // The probes' expected outputs come from the firmware itself, out of a file without probes.
     let bare_lane = Section { offset: 0, length: 0 };
     let mut bare = card.clone();
-    bare.probes.lane = bare_lane;
+    bare.probes.feedback = bare_lane;
     let probe_rows = if card.network.is_some() { probe_rows(description, calibration) } else { Vec::new() };
     let (outputs, lane_probe) = expected(&bare, &blob, &probe_rows)?;
     card.probes = Probes {
         count: probe_rows.len() as u8,
         network: blob.floats(probe_rows.into_iter().flatten().chain(outputs)),
-        lane: blob.floats(lane_probe.into_iter().take(lane_outputs)),
+        feedback: blob.floats(lane_probe.into_iter().take(lane_outputs)),
     };
     let bytes = assemble(&card, &blob.0)?;
     Model::from_bytes(&bytes).map_err(ExportError::Refused)?;
@@ -311,7 +311,7 @@ fn output_bounds(
 /// What the firmware computes for the probes.
 fn expected(card: &Card<'_>, blob: &BlobWriter, rows: &[Vec<f32>]) -> Result<(Vec<f32>, [f32; model::MAX_AXES]), ExportError> {
     let mut without_lane = card.clone();
-    without_lane.lane = None;
+    without_lane.feedback = None;
     let bytes = assemble(&without_lane, &blob.0)?;
     let model = Model::from_bytes(&bytes).map_err(ExportError::Refused)?;
     let mut outputs = Vec::new();
@@ -323,7 +323,7 @@ fn expected(card: &Card<'_>, blob: &BlobWriter, rows: &[Vec<f32>]) -> Result<(Ve
             outputs.extend_from_slice(&output[..card.outputs.len()]);
         }
     }
-    let lane = match &card.lane {
+    let lane = match &card.feedback {
         Some(layout) => {
             let lane = feedback::Lane::new(layout, &model::Blob::new(&blob.0)).map_err(ExportError::Refused)?;
             feedback::probe(&lane, 1.0 / card.timing.reference_rate_hz)

@@ -324,7 +324,7 @@ fn monitor(model: &Model<'_>) -> Option<InspectedMonitor> {
     Some(InspectedMonitor {
         period_s,
         memory_s: period_s * monitor.taps() as f32,
-        validated_rms: monitor.promise(),
+        validated_rms: monitor.validated_rms(),
         unit: channel(&card.signals.measured, first).1.into(),
         axes: axes.collect(),
     })
@@ -332,7 +332,7 @@ fn monitor(model: &Model<'_>) -> Option<InspectedMonitor> {
 
 fn feedback_lane(model: &Model<'_>) -> Option<InspectedLane> {
     let card = model.card();
-    let layout = card.lane.as_ref()?;
+    let layout = card.feedback.as_ref()?;
     let axes = layout.axes.iter().map(|axis| {
         let index = card.outputs.get(usize::from(axis.output)).map_or(0, |output| output.channel);
         let (output, unit) = channel(&card.signals.reference, index);
@@ -347,7 +347,7 @@ fn feedback_lane(model: &Model<'_>) -> Option<InspectedLane> {
     });
     Some(InspectedLane {
         lags: layout.lags,
-        multiply_adds: model.lane()?.multiply_adds(),
+        multiply_adds: model.feedback()?.multiply_adds(),
         margins: layout.margins,
         axes: axes.collect(),
     })

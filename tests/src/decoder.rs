@@ -36,7 +36,7 @@ fn load(bytes: &[u8]) -> bool {
         let mixed: [f32; MAX_FEATURES] = core::array::from_fn(|i| EXTREMES[i % EXTREMES.len()]);
         network.evaluate(&mixed, &mut outputs, &mut scratch);
     }
-    if let Some(lane) = model.lane() {
+    if let Some(lane) = model.feedback() {
         let _ = feedback::probe(lane, 1.0 / model.card().timing.reference_rate_hz);
     }
     fly(&model);
@@ -78,14 +78,14 @@ fn with_probes(bytes: &[u8]) -> Option<Vec<u8>> {
     let mut card: Card<'_> = postcard::from_bytes(card).ok()?;
     let mut blob = blob.to_vec();
     let mut probe = Vec::new();
-    if let Some(layout) = &card.lane {
+    if let Some(layout) = &card.feedback {
         let lane = Lane::new(layout, &Blob::new(&blob)).ok()?;
         let outputs = feedback::probe(&lane, 1.0 / card.timing.reference_rate_hz);
         probe.extend(outputs.iter().take(layout.axes.len()).flat_map(|output| output.to_le_bytes()));
     }
     blob.resize(blob.len().next_multiple_of(file::ALIGNMENT), 0);
     card.probes =
-        Probes { count: 0, network: Section::default(), lane: Section { offset: blob.len() as u32, length: probe.len() as u32 } };
+        Probes { count: 0, network: Section::default(), feedback: Section { offset: blob.len() as u32, length: probe.len() as u32 } };
     blob.extend(probe);
     let card = postcard::to_allocvec(&card).ok()?;
     let mut bytes = file::header(card.len() as u32, blob.len() as u32).to_vec();

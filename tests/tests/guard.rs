@@ -98,7 +98,7 @@ fn fly(plant: &Loop, trajectories: &[Trajectory], bytes: &[u8], lanes: Lanes, gu
         }
         let trips = &record.trips;
         outcome.trips = [0, 1].map(|lane| outcome.trips[lane] + u32::from(trips.by_lane()[lane]));
-        outcome.by_evidence += u32::from(trips.of(Trip::Evidence));
+        outcome.by_evidence += u32::from(trips.of(Trip::Counterfactual));
         outcome.by_oscillation += u32::from(trips.of(Trip::Oscillation));
         outcome.tripped += usize::from(trips.by_lane() != [0, 0]);
     }

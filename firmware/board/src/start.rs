@@ -3,7 +3,7 @@
 use impromptu_firmware::{
     model::{Model, Refusal},
     network::{Network, Scratch},
-    storage::{Place, Sequence, Survey, survey},
+    storage::{SlotIndex, Sequence, Survey, survey},
 };
 use impromptu_flight::{application::Application, flight::Flight};
 use static_cell::ConstStaticCell;
@@ -17,7 +17,7 @@ pub struct Start {
     /// For the inference task.
     pub network: Option<&'static Network<'static>>,
     /// The slot for the next upload.
-    pub spare: Place,
+    pub spare: SlotIndex,
     /// Its number.
     pub sequence: Sequence,
     /// For the inference and the storage task, neither of which interrupts the other.
@@ -36,7 +36,7 @@ pub fn start(slots: [&'static [u8]; 2]) -> Option<Start> {
     let model = flies.and_then(|stored| model(stored.file(), scratch));
     if let Some(model) = model {
         // It was checked to fit.
-        let _ = autopilot.load(model, Some(u8::from(spare == Place::First)));
+        let _ = autopilot.load(model, Some(u8::from(spare == SlotIndex::First)));
     }
     Some(Start { application, network: model.and_then(Model::network), spare, sequence, scratch })
 }
@@ -51,6 +51,6 @@ pub fn fits(model: &Model<'_>) -> Result<(), Refusal> {
 
 #[inline(never)]
 fn model(file: &'static [u8], scratch: &mut Scratch) -> Option<&'static Model<'static>> {
-    static MODEL: ConstStaticCell<Model<'static>> = ConstStaticCell::new(Model::VACANT);
+    static MODEL: ConstStaticCell<Model<'static>> = ConstStaticCell::new(Model::EMPTY);
     Model::load_into(MODEL.take(), file, scratch).ok()
 }

@@ -89,7 +89,7 @@ impl Tasks {
     pub fn hear(&self, application: &mut Application<'_>, bytes: &[u8]) -> bool {
         let mut piece = false;
         for byte in bytes {
-            if let Some(upload) = application.hear(*byte) {
+            if let Some(upload) = application.on_byte(*byte) {
                 self.uploads.put(0, upload.words());
                 piece = true;
             }

@@ -101,7 +101,7 @@ impl Description {
             future,
             outputs: card.outputs.len() as u32,
             network: u32::from(model.network().is_some()),
-            feedback: u32::from(model.lane().is_some()),
+            feedback: u32::from(model.feedback().is_some()),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The autopilot behind its serial line: bytes in, bytes out, one step at each control tick.
 //!
-//! *in* bytes as they come, control ticks, results of the tasks of lower priority; *out* motor commands, jobs for those tasks, bytes to be
-//! sent; *never* a wait, or more work in a tick than the bytes it is given and one step; *source* ours.
+//! *in* bytes as they come, control ticks, results of the tasks of lower priority; *out* motor commands, jobs for those tasks,
+//! bytes to be sent; *never* a wait, or more work in a tick than the bytes it is given and one step.
 
 mod upload;
 
@@ -19,7 +19,7 @@ use crate::{
 
 pub use upload::{Upload, WORDS, outcome_from_words, outcome_words};
 
-/// Bytes that can wait to be sent: what a tick says at most, and some acknowledgements.
+/// Bytes that can wait to be sent: what a tick sends at most, and some acknowledgements.
 pub const OUTBOX: usize = FRAME + FRAME / 2;
 /// Control ticks from one telemetry report to the next.
 const TELEMETRY_TICKS: u32 = 50;
@@ -32,7 +32,7 @@ pub const SOFTWARE: &str = concat!("impromptu ", env!("CARGO_PKG_VERSION"));
 pub struct Application<'m> {
     autopilot: Autopilot<'m>,
     receiver: Receiver<Commands>,
-    voice: Voice,
+    tx: TxQueue,
     /// Control ticks since the last telemetry report.
     telemetry: u32,
     storing: Storing,
@@ -53,14 +53,14 @@ enum Storing {
 
 /// Messages to bytes that wait to be sent.
 #[derive(Debug)]
-struct Voice {
+struct TxQueue {
     sender: Sender,
     outbox: Vec<u8, OUTBOX>,
 }
 
-impl Voice {
+impl TxQueue {
     /// A message for which there is no room is dropped: the line is slower than the reports, and the next one tells more.
-    fn say(&mut self, message: &impl Message) {
+    fn send(&mut self, message: &impl Message) {
         let waiting = self.outbox.len();
         // It is encoded where it waits.
         let _ = self.outbox.resize_default(OUTBOX.min(waiting.saturating_add(FRAME)));
@@ -83,10 +83,10 @@ impl Default for Application<'_> {
 }
 
 impl<'m> Application<'m> {
-    /// An application that has heard and said nothing.
+    /// An application that has received and sent nothing.
     pub const fn new() -> Self {
-        let voice = Voice { sender: Sender::new(), outbox: Vec::new() };
-        Self { autopilot: Autopilot::new(), receiver: Receiver::new(), voice, telemetry: 0, storing: Storing::No }
+        let tx = TxQueue { sender: Sender::new(), outbox: Vec::new() };
+        Self { autopilot: Autopilot::new(), receiver: Receiver::new(), tx, telemetry: 0, storing: Storing::No }
     }
 
     /// The vehicle.
@@ -96,8 +96,8 @@ impl<'m> Application<'m> {
 
     /// Takes a byte from the line. A command that concerns the flash is for a task which may wait; its outcome is for
     /// [`Application::acknowledge`].
-    pub fn hear(&mut self, byte: u8) -> Option<Upload> {
-        let Self { autopilot, receiver, voice, storing, .. } = self;
+    pub fn on_byte(&mut self, byte: u8) -> Option<Upload> {
+        let Self { autopilot, receiver, tx, storing, .. } = self;
         let (sequence, outcome) = match receiver.push(byte)? {
             Ok(Received { sequence, order, message }) => {
                 let upload = Upload::new(sequence, &message).filter(|_| order != Order::Late);
@@ -118,10 +118,10 @@ impl<'m> Application<'m> {
                     // The core stands still while the flash is erased.
                     (sequence, Outcome::Refused(Reason::Busy))
                 } else {
-                    match autopilot.obey(&Received { sequence, order, message }) {
+                    match autopilot.handle(&Received { sequence, order, message }) {
                         Reaction::Silence => return None,
                         Reaction::Introduce => {
-                            voice.say(&Report::Identity(autopilot.identity(SOFTWARE)));
+                            tx.send(&Report::Identity(autopilot.identity(SOFTWARE)));
                             return None;
                         }
                         Reaction::Acknowledge(outcome) => (sequence, outcome),
@@ -131,7 +131,7 @@ impl<'m> Application<'m> {
             Err(Fault::Message { sequence, reason }) => (sequence, Outcome::Refused(reason)),
             Err(_) => return None,
         };
-        voice.say(&Report::Acknowledge { sequence, outcome });
+        tx.send(&Report::Acknowledge { sequence, outcome });
         None
     }
 
@@ -141,7 +141,7 @@ impl<'m> Application<'m> {
             (Storing::Stored, _) | (Storing::Last, Outcome::Done) => Storing::Stored,
             _ => Storing::No,
         };
-        self.voice.say(&Report::Acknowledge { sequence, outcome });
+        self.tx.send(&Report::Acknowledge { sequence, outcome });
     }
 
     /// Whether a task of lower priority has a piece of a model in work, so that the core may stand still for seconds.
@@ -169,25 +169,25 @@ impl<'m> Application<'m> {
         let flew = self.autopilot.armed();
         let (command, released) = self.autopilot.step(job);
         if flew {
-            self.voice.say(&Report::Motors(self.autopilot.motors(&command)));
+            self.tx.send(&Report::Motors(self.autopilot.motors(&command)));
         }
         self.telemetry = self.telemetry.saturating_add(1);
         if self.telemetry >= TELEMETRY_TICKS {
             self.telemetry = 0;
             let frames = self.frames();
-            self.voice.say(&Report::Telemetry(self.autopilot.telemetry(meters, frames)));
+            self.tx.send(&Report::Telemetry(self.autopilot.telemetry(meters, frames)));
         }
         (command, released)
     }
 
     /// The bytes that wait to be sent.
     pub fn outbox(&self) -> &[u8] {
-        &self.voice.outbox
+        &self.tx.outbox
     }
 
     /// Forgets the bytes that waited: they are sent.
     pub fn sent(&mut self) {
-        self.voice.outbox.clear();
+        self.tx.outbox.clear();
     }
 
     fn frames(&self) -> FrameReport {

@@ -1,17 +1,19 @@
 //! The vehicle on its link: what it is told, what it does, and what it does when it is told nothing.
 //!
-//! *in* the link's commands and control ticks; *out* a motor command at every tick; *never* motors that turn while disarmed, or for longer
-//! than [`Patience::motors_inertial_s`] without news of attitude and position; *source* ours.
+//! *in* the link's commands and control ticks; *out* a motor command at every tick; *never* motors that turn while disarmed, or
+//! for longer than [`Timeouts::motors_inertial_s`] without a new attitude or position.
 //!
 //! | what arrives | what happens |
 //! |---|---|
-//! | nothing for a while | the newest state is held; after [`Patience::lanes_inertial_s`] the add-on fades out, after [`Patience::motors_inertial_s`] motors off, disarmed |
+//! | nothing for a while | the newest state is held |
+//! | nothing for [`Timeouts::lanes_inertial_s`] | the add-on fades out |
+//! | nothing for [`Timeouts::motors_inertial_s`] | motors off, disarmed |
 //! | a state that is older than the newest | ignored |
-//! | a setpoint after a gap | the gap is filled in a straight line; one longer than the preview is not: the trajectory begins anew |
+//! | a setpoint after a gap | filled in a straight line; if it is longer than the preview, the trajectory begins anew |
 //! | a setpoint that is stored already | ignored |
 //! | no setpoint any more | the end of the trajectory is held |
 
-mod news;
+mod state_age;
 
 use impromptu_firmware::{
     adapter::{Inference, Job, Lanes},
@@ -31,8 +33,8 @@ use crate::{
     types::{MotorCommand, Reference, Setpoint, State, Tick},
 };
 
-use news::News;
-pub use news::Patience;
+use state_age::StateAge;
+pub use state_age::Timeouts;
 
 /// What a board measures of itself; the unit of costs is the board's (instructions or cycles).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -60,7 +62,7 @@ pub enum Reaction {
     Acknowledge(Outcome),
 }
 
-/// The flight stack with arming, and with patience for a link that fails.
+/// The flight stack with arming, and with timeouts for a link that fails.
 #[derive(Debug)]
 pub struct Autopilot<'m> {
     flight: Flight<'m>,
@@ -69,7 +71,7 @@ pub struct Autopilot<'m> {
     slot: Option<u8>,
     lanes: Lanes,
     state: State,
-    news: News,
+    age: StateAge,
     /// Control ticks since the motors were armed.
     tick: Tick,
     armed: bool,
@@ -98,7 +100,7 @@ impl<'m> Autopilot<'m> {
                 attitude: UnitQuaternion::new_unchecked(Quaternion::from_vector(Vector4::new(0.0, 0.0, 0.0, 0.0))),
                 ..State::ORIGIN
             },
-            news: News::NONE,
+            age: StateAge::NONE,
             tick: Tick(0),
             armed: false,
             setpoint: Setpoint::ORIGIN,
@@ -131,7 +133,7 @@ impl<'m> Autopilot<'m> {
         if !self.flight.configure(settings) {
             return Err(Reason::Settings);
         }
-        (self.rates, self.news, self.state) = (Some(settings.rates), News::new(&settings.rates), State::ORIGIN);
+        (self.rates, self.age, self.state) = (Some(settings.rates), StateAge::new(&settings.rates), State::ORIGIN);
         match self.model {
             Some(model) if self.flight.adapter().is_none() => {
                 self.flight.attach(model, Lanes::NONE).map_err(|refusal| Reason::Model((&refusal).into()))
@@ -152,21 +154,21 @@ impl<'m> Autopilot<'m> {
 
     /// Whether a new attitude came since the last tick.
     pub fn informed(&self) -> bool {
-        self.news.informed()
+        self.age.informed()
     }
 
-    /// Obeys a command, or does not; models are the board's affair.
-    pub fn obey(&mut self, received: &Received<Command<'_>>) -> Reaction {
+    /// Carries a command out, or does not; models are the board's affair.
+    pub fn handle(&mut self, received: &Received<Command<'_>>) -> Reaction {
         let outcome = match (&received.message, received.order) {
             (Command::Hello, _) => return Reaction::Introduce,
             (Command::Inertial(inertial), _) => {
-                if self.news.inertial(inertial.tick) {
+                if self.age.inertial(inertial.tick) {
                     inertial.apply(&mut self.state);
                 }
                 return Reaction::Silence;
             }
             (Command::Position(position), _) => {
-                if self.news.position(position.tick) {
+                if self.age.position(position.tick) {
                     position.apply(&mut self.state);
                 }
                 return Reaction::Silence;
@@ -194,15 +196,15 @@ impl<'m> Autopilot<'m> {
 
     /// One control tick: what the motors get, and whether there is a job of the network for a task of lower priority.
     pub fn step(&mut self, job: &mut Job) -> (MotorCommand, bool) {
-        self.news.tick();
+        self.age.tick();
         if !self.armed {
             return (MotorCommand::OFF, false);
         }
-        if self.news.motors_off() {
+        if self.age.motors_off() {
             self.disarm();
             return (MotorCommand::OFF, false);
         }
-        let age = if self.news.lanes_off() { u16::MAX } else { 0 };
+        let age = if self.age.lanes_off() { u16::MAX } else { 0 };
         if let Some(adapter) = self.flight.adapter() {
             adapter.switch(self.lanes);
             // The guard counts it, and waits before the lanes come back.
@@ -274,7 +276,7 @@ impl<'m> Autopilot<'m> {
 
     fn switch(&mut self, lanes: Lanes) -> Result<(), Reason> {
         let missing = (lanes.network && self.model.and_then(Model::network).is_none())
-            || (lanes.feedback && self.model.and_then(Model::lane).is_none());
+            || (lanes.feedback && self.model.and_then(Model::feedback).is_none());
         if missing {
             return Err(Reason::NoModel);
         }
@@ -289,14 +291,14 @@ impl<'m> Autopilot<'m> {
         if self.rates.is_none() {
             return Err(Reason::Settings);
         }
-        if self.news.lanes_off() {
+        if self.age.lanes_off() {
             return Err(Reason::NoState);
         }
         if self.flight.next_setpoint() == 0 {
             return Err(Reason::Setpoint { expected: 0 });
         }
         (self.armed, self.tick, self.error_square) = (true, Tick(0), 0.0);
-        self.news.seen();
+        self.age.seen();
         Ok(())
     }
 
@@ -304,7 +306,7 @@ impl<'m> Autopilot<'m> {
     fn disarm(&mut self) {
         self.armed = false;
         if let Some(rates) = &self.rates {
-            self.news = News::new(rates);
+            self.age = StateAge::new(rates);
         }
         self.flight.reset();
     }

@@ -1,7 +1,7 @@
 //! The flight stack: a value in, a value out, time is an argument.
 //!
-//! *in* the state at every control tick and the desired trajectory ahead of time; *out* a motor command; *never* an allocation, a panic,
-//! a global, or a clock of its own; *source* the loop of Zhou 2017, Fig. 1, with the rates of [`Rates`].
+//! *in* the state at every control tick and the desired trajectory ahead of time; *out* a motor command; *never* an allocation, a
+//! panic, a global, or a clock of its own; *source* the loop of Zhou 2017, Fig. 1, with the rates of [`Rates`].
 
 use core::num::NonZeroU32;
 
@@ -50,7 +50,8 @@ impl Loops {
     }
 }
 
-/// What is configured and attached. The adapter has a model exactly if this is [`Stage::Adapted`], and a model that fits these loops.
+/// What is configured and attached. The adapter has a model exactly if this is [`Stage::Adapted`], and a model that fits these
+/// loops.
 #[derive(Debug)]
 enum Stage {
     /// Nothing is known of a vehicle: its motors are off.
@@ -89,8 +90,8 @@ pub struct Flight<'m> {
 }
 
 impl<'m> Flight<'m> {
-    /// A flight stack that knows no vehicle: its motors are off. It is 12 KB large and all zeros, so a microcontroller has it in a static
-    /// and [configures](Flight::configure) it there.
+    /// A flight stack that knows no vehicle: its motors are off. It is 12 KB large and all zeros, so a microcontroller has it in
+    /// a static and [configures](Flight::configure) it there.
     pub const fn empty() -> Self {
         Self {
             stage: Stage::Empty,
@@ -111,8 +112,8 @@ impl<'m> Flight<'m> {
         flight.configure(settings).then_some(flight)
     }
 
-    /// Back on the ground with these settings; `false`, and nothing changes, if the airframe cannot be mixed. An add-on stays, as it was when
-    /// it was attached but with its lanes off, if its model is for these settings; else it is detached.
+    /// Back on the ground with these settings; `false`, and nothing changes, if the airframe cannot be mixed. An add-on stays, as
+    /// it was when it was attached but with its lanes off, if its model is for these settings; else it is detached.
     pub fn configure(&mut self, settings: &Settings) -> bool {
         let Some(loops) = Loops::new(settings) else { return false };
         if self.adapter.model().is_some_and(|model| Self::accepts(model, &settings.rates).is_ok()) {
@@ -126,8 +127,8 @@ impl<'m> Flight<'m> {
         true
     }
 
-    /// Back on the ground: the next setpoint is that of reference tick 0, and nothing is left of the last flight but the lanes that are
-    /// wanted and the counts.
+    /// Back on the ground: the next setpoint is that of reference tick 0, and nothing is left of the last flight but the lanes
+    /// that are wanted and the counts.
     pub fn reset(&mut self) {
         if let Some(loops) = self.stage.loops_mut() {
             loops.position.reset();
@@ -140,8 +141,8 @@ impl<'m> Flight<'m> {
     /// Puts an add-on before the configured loops, with the lanes given, in the place of the one that was there.
     ///
     /// # Errors
-    /// If the model is for other signals, another rate, or a longer preview; what was attached then stays. A flight stack without settings
-    /// has a rate of 0.
+    /// If the model is for other signals, another rate, or a longer preview; what was attached then stays. A flight stack without
+    /// settings has a rate of 0.
     pub fn attach(&mut self, model: &'m Model<'m>, lanes: Lanes) -> Result<(), Refusal> {
         Self::accepts(model, &self.stage.loops().map_or(Rates::NONE, |loops| loops.rates))?;
         self.adapter.load(model, &quadrotor::signals());
@@ -212,8 +213,8 @@ impl<'m> Flight<'m> {
         Vector3::new(x, y, z)
     }
 
-    /// Adds an offset, m, world ENU, to the position reference from the next reference tick on: the independent dither without which
-    /// the closed loop cannot be identified. Zero leaves every bit as it is.
+    /// Adds an offset, m, world ENU, to the position reference from the next reference tick on: the independent dither without
+    /// which the closed loop cannot be identified. Zero leaves every bit as it is.
     pub fn excite(&mut self, offset: Vector3<f32>) {
         self.excitation = offset;
     }
@@ -246,10 +247,10 @@ impl<'m> Flight<'m> {
         (self.attitude_step(&self.wanted, state), released)
     }
 
-    /// The first half of a control tick: at a reference tick what the position loop wants of the attitude loop, and whether `job` was
-    /// written. In flight [`Flight::control`] hands the one to the other at once; a simulator puts here what it wants to know the
-    /// effect of: a command that is late, or, in `path`, a feedback lane of which the loop gets more or less than the lane knows
-    /// ([`Adapter::finish_through`]).
+    /// The first half of a control tick: at a reference tick what the position loop wants of the attitude loop, and whether `job`
+    /// was written. In flight [`Flight::control`] hands the one to the other at once; a simulator puts here what it wants to know
+    /// the effect of: a command that is late, or, in `path`, a feedback lane of which the loop gets more or less than the lane
+    /// knows ([`Adapter::finish_through`]).
     pub fn position_step(
         &mut self,
         tick: Tick,

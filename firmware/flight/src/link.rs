@@ -1,8 +1,8 @@
 //! The serial link: messages to and from the vehicle as bytes which may be lost, damaged or delayed.
 //!
-//! *in* bytes, as they come, or messages; *out* messages whose every number is finite, or frames; *never* a panic, a message that was not
-//! sent (but for a chance of 2^-32 in each damaged frame), or a number that was rounded or normalised; *source* this file and the order of
-//! the fields in [`message`] and [`outcome`] are the protocol's specification.
+//! *in* bytes, as they come, or messages; *out* messages whose every number is finite, or frames; *never* a panic, a message that
+//! was not sent (but for a chance of 2^-32 in each damaged frame), or a number that was rounded or normalised; *source* this file
+//! and the order of the fields in [`message`] and [`outcome`] are the protocol's specification.
 //!
 //! ```text
 //! frame    COBS( payload, CRC ) 0x00           at most 256 bytes
@@ -12,8 +12,8 @@
 //! ```
 //!
 //! The sequence counts the sender's frames modulo 256. What lies between two zeros is a frame or nothing, so whatever happens the
-//! receiver is in step again at the next zero. Version 1 is frozen: `link/frozen.rs` holds the exact bytes of every message. Messages and
-//! reasons may be added behind the last one; everything else makes another version.
+//! receiver is in step again at the next zero. Version 1 is frozen: `link/frozen.rs` holds the exact bytes of every message.
+//! Messages and reasons may be added behind the last one; everything else makes another version.
 
 pub mod message;
 pub mod outcome;

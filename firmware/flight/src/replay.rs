@@ -1,7 +1,8 @@
 //! A recorded flight: every call of the flight stack in order, and its answers, so that another machine can fly it again.
 //!
-//! *in* the calls of [`crate::flight::Flight`], bit by bit; *out* fixed-size records that are read and written one at a time; *never* a record that is
-//! rounded, normalised or skipped: what cannot be flown again to the bit is refused; *source* this file is the format's specification.
+//! *in* the calls of [`crate::flight::Flight`], bit by bit; *out* fixed-size records that are read and written one at a time;
+//! *never* a record that is rounded, normalised or skipped: what cannot be flown again to the bit is refused; *source* this file
+//! is the format's specification.
 //!
 //! A **recording** is a header of [`HEADER`] bytes, then records of [`RECORD`] bytes, the last of which is [`Event::End`]:
 //!
@@ -16,7 +17,7 @@
 //! | record | content |
 //! |--:|---|
 //! | 0..4 | kind, u32: 1 tick, 2 setpoint, 3 lanes, 4 excitation, 5 end |
-//! | 4.. | 14, 10 or 3 f32 in the order of the fields; lanes as u32 (bit 0 network, bit 1 feedback); end: number of ticks, u32. Then zeros |
+//! | 4.. | 14, 10 or 3 f32 in the order of the fields; lanes, u32: bit 0 network, bit 1 feedback; end: ticks, u32. Then zeros |
 //!
 //! The **answers** are [`ANSWER`] bytes for each tick: four motor fractions, reference position and velocity, f32.
 //! All numbers are little-endian.

@@ -1,7 +1,7 @@
 //! What a flight stack is told of its vehicle and its loops.
 //!
-//! *in* numbers of the vehicle's file; *out* settings of the loops; *never* a check: what cannot be flown is refused where it is used;
-//! *source* the rates of the Crazyflie's firmware.
+//! *in* numbers of the vehicle's file; *out* settings of the loops; *never* a check: what cannot be flown is refused where it is
+//! used; *source* the rates of the Crazyflie's firmware.
 
 use serde::{Deserialize, Serialize};
 

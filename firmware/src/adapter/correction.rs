@@ -1,7 +1,7 @@
 //! Both lanes added, within the model's limits and slew.
 //!
-//! *in* what each lane wants and how far it is faded in; *out* the correction, and what each lane has of it; *never* more than an output's
-//! limit, nor more than its slew from one tick to the next; *source* ours.
+//! *in* what each lane wants and how far it is faded in; *out* the correction, and what each lane has of it; *never* more than an
+//! output's limit, nor more than its slew from one tick to the next.
 
 use crate::{
     format::{Card, MAX_AXES, MAX_OUTPUTS},
@@ -36,8 +36,8 @@ impl Correction {
         self.values.iter().any(|value| *value != 0.0)
     }
 
-    /// Adds the lanes to `reference`, within limits and slew; the feedback lane's part by way of `path`. Returns what each axis of the
-    /// feedback lane has got, in the outputs' units.
+    /// Adds the lanes to `reference`, within limits and slew; the feedback lane's part by way of `path`. Returns what each axis
+    /// of the feedback lane has got, in the outputs' units.
     pub(super) fn apply(
         &mut self,
         card: &Card<'_>,
@@ -49,7 +49,7 @@ impl Correction {
         let mut asked = wanted.feedback.map(|value| value * wanted.feedback_weight);
         path(&mut asked);
         let mut feedback = [None; MAX_OUTPUTS];
-        let axes = card.lane.iter().flat_map(|lane| &lane.axes);
+        let axes = card.feedback.iter().flat_map(|lane| &lane.axes);
         for (axis, value) in axes.clone().zip(asked) {
             if let Some(place) = feedback.get_mut(usize::from(axis.output)) {
                 *place = Some(value);
@@ -99,10 +99,10 @@ impl Correction {
     }
 }
 
-/// An outcome in which nothing was applied, with what the network lane would do alone.
+/// An outcome in which nothing was applied, with what the network lane would do without the other.
 fn shadow(card: &Card<'_>, network: &[f32; MAX_OUTPUTS], outcome: &mut Outcome) {
     (outcome.shares, outcome.excess) = (Shares::NONE, [false; 2]);
-    for ((alone, network), output) in outcome.shares.alone.iter_mut().zip(network).zip(&card.outputs) {
-        *alone = clamp(*network, -output.limit, output.limit);
+    for ((only, network), output) in outcome.shares.network_only.iter_mut().zip(network).zip(&card.outputs) {
+        *only = clamp(*network, -output.limit, output.limit);
     }
 }

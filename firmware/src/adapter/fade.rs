@@ -1,4 +1,7 @@
-//! How lanes come and go.
+//! How lanes come and go: bumpless transfer by a weight that is ramped.
+//!
+//! *in* which lanes are wanted, allowed and present; *out* the next weight of each; *never* a change of weight above the fade's
+//! step, or, of a lane that tripped, the handover's; *source* bumpless transfer of Åström and Hägglund 2006.
 
 use crate::math::clamp;
 
@@ -17,7 +20,7 @@ impl Fade {
         Self { step, handover: step.max(handover) }
     }
 
-    /// The next weight of a lane that is wanted, which the guard allows, and which has something to say, or not.
+    /// The next weight of a lane that is wanted, which the guard allows, and which has a correction, or not.
     pub(super) fn next(&self, weight: f32, wanted: bool, allowed: bool, present: bool) -> f32 {
         let change = if allowed && present {
             self.step

@@ -1,7 +1,7 @@
 //! The feedback lane's state, and the loop's errors.
 //!
-//! *in* measured channels, desired ones at the time of the measurement; *out* errors, and what the lane wants on each of its axes; *never* more
-//! than its clamps, which [`crate::feedback`] keeps; *source* ours.
+//! *in* measured channels, desired ones at the time of the measurement; *out* errors, and what the lane wants on each of its
+//! axes; *never* more than its clamps, which [`crate::feedback`] keeps.
 
 use super::signals::matched_error;
 use crate::{
@@ -11,8 +11,8 @@ use crate::{
     preview::Preview,
 };
 
-/// Bound of what lowers the feedback lane's authority: a millionth of it is left.
-const VIGOUR_LIMIT: f32 = 1e6;
+/// Bound of the activity, which lowers the feedback lane's authority: a millionth of it is left.
+const ACTIVITY_LIMIT: f32 = 1e6;
 
 /// Errors of each axis of the feedback lane.
 pub(super) type Errors = [[f32; MAX_ERRORS]; MAX_AXES];
@@ -21,20 +21,21 @@ pub(super) type Errors = [[f32; MAX_ERRORS]; MAX_AXES];
 #[derive(Debug)]
 pub(super) struct Feedback {
     axes: [AxisState; MAX_AXES],
-    /// Recent peak of what is desired of the loop and of its errors ([`crate::format::Authority`]).
-    vigour: f32,
+    /// Activity, the variable of the gain-scheduled saturation: recent peak of what is desired of the loop and of its errors
+    /// ([`crate::format::Authority`]).
+    activity: f32,
 }
 
 impl Feedback {
-    /// At rest.
-    pub(super) const REST: Self = Self { axes: [AxisState::REST; MAX_AXES], vigour: 0.0 };
+    /// Nothing seen yet: all zeros.
+    pub(super) const EMPTY: Self = Self { axes: [AxisState::EMPTY; MAX_AXES], activity: 0.0 };
 
-    /// As [`Feedback::REST`], in place.
+    /// As [`Feedback::EMPTY`], in place.
     pub(super) fn reset(&mut self) {
         for axis in &mut self.axes {
-            *axis = AxisState::REST;
+            *axis = AxisState::EMPTY;
         }
-        self.vigour = 0.0;
+        self.activity = 0.0;
     }
 
     /// Share of the fast clamps that the feedback lane may use at this tick, at which its axes have these errors.
@@ -45,16 +46,16 @@ impl Feedback {
         preview: &Preview<D, N>,
         errors: &Errors,
     ) -> f32 {
-        let Some(layout) = &model.card().lane else { return 1.0 };
+        let Some(layout) = &model.card().feedback else { return 1.0 };
         let authority = &layout.authority;
         let desired = authority.channels.iter().map(|&channel| preview.channel(tick, usize::from(channel)) / authority.scale);
         let strayed = errors.iter().map(|errors| errors[0] / authority.error_scale);
         let now = desired.chain(strayed).fold(0.0, |sum, value| sum + value * value);
-        // Also what is no number counts as far astray; the bound lets the lane come back in seconds.
-        let now = if now < VIGOUR_LIMIT { now } else { VIGOUR_LIMIT };
-        let past = self.vigour * authority.decay;
-        self.vigour = if now > past { now } else { past };
-        1.0 / (1.0 + self.vigour * self.vigour)
+        // NaN too counts as far astray; the bound lets the lane come back in seconds.
+        let now = if now < ACTIVITY_LIMIT { now } else { ACTIVITY_LIMIT };
+        let past = self.activity * authority.decay;
+        self.activity = if now > past { now } else { past };
+        1.0 / (1.0 + self.activity * self.activity)
     }
 
     /// The feedback lane's output on each of its axes.
@@ -64,21 +65,21 @@ impl Feedback {
         tick: i32,
         preview: &Preview<D, N>,
         errors: &Errors,
-        engaged: bool,
+        active: bool,
     ) -> [f32; MAX_AXES] {
         let mut outputs = [0.0; MAX_AXES];
-        let Some(lane) = model.lane() else { return outputs };
+        let Some(lane) = model.feedback() else { return outputs };
         let dt = 1.0 / model.card().timing.reference_rate_hz;
         let authority = self.authority(model, tick, preview, errors);
         for (((axis, state), errors), output) in lane.axes().iter().zip(&mut self.axes).zip(errors).zip(&mut outputs) {
-            *output = state.step(lane, axis, *errors, authority, dt, engaged);
+            *output = state.step(lane, axis, *errors, authority, dt, active);
         }
         outputs
     }
 
     /// Tells the lane what was applied of it.
     pub(super) fn applied(&mut self, model: &Model<'_>, applied: &[f32; MAX_AXES]) {
-        if let Some(lane) = model.lane() {
+        if let Some(lane) = model.feedback() {
             for (state, &value) in self.axes.iter_mut().zip(applied).take(lane.axes().len()) {
                 state.applied(lane, value);
             }
@@ -86,8 +87,8 @@ impl Feedback {
     }
 
     /// The lane is faded out.
-    pub(super) fn release(&mut self) {
-        self.axes.iter_mut().for_each(AxisState::release);
+    pub(super) fn clear_integrals(&mut self) {
+        self.axes.iter_mut().for_each(AxisState::clear_integral);
     }
 }
 
@@ -99,7 +100,7 @@ pub(super) fn errors<const D: usize, const N: usize>(
     measured: &[f32],
 ) -> Errors {
     let mut errors = [[0.0; MAX_ERRORS]; MAX_AXES];
-    let Some(lane) = model.lane() else { return errors };
+    let Some(lane) = model.feedback() else { return errors };
     let delay = model.card().timing.measurement_delay_ticks;
     for (axis, errors) in lane.axes().iter().zip(&mut errors) {
         for (error, channels) in errors.iter_mut().zip(&axis.layout().errors) {
@@ -120,7 +121,7 @@ pub(super) fn monitored<const D: usize, const N: usize>(
     let mut errors = [0.0; MAX_AXES];
     let Some(monitor) = model.monitor() else { return errors };
     let delay = model.card().timing.measurement_delay_ticks;
-    let lane = model.lane().map_or(&[][..], |lane| lane.axes());
+    let lane = model.feedback().map_or(&[][..], |lane| lane.axes());
     for (index, ((axis, _), error)) in monitor.axes().iter().zip(&mut errors).enumerate() {
         let same = lane.get(index).is_some_and(|lane| lane.layout().errors.first() == Some(&axis.error));
         *error = match known.get(index) {

@@ -1,7 +1,7 @@
 //! The network lane's work, apart from the control loop: features in, correction out.
 //!
-//! *in* the features of one sub-rate tick; *out* the network's outputs for it; *never* anything else that is shared with the control
-//! loop, so that a task of lower priority can do it; *source* ours.
+//! *in* the features of one sub-rate tick; *out* the network's outputs for it; *never* anything else that is shared with the
+//! control loop, so that a task of lower priority can do it.
 
 use crate::{
     format::{MAX_FEATURES, MAX_OUTPUTS},

@@ -1,7 +1,7 @@
 //! What becomes of inferences between sub-rate ticks: held or ramped, and what happens when one is late.
 //!
-//! *in* when a job was released, and its inference when it comes; *out* the network lane's correction at every reference tick; *never* a
-//! step when an inference is late: the correction stays where it is; *source* ours, for Zhou 2017's sub-rate.
+//! *in* when a job was released, and its inference when it comes; *out* the network lane's correction at every reference tick;
+//! *never* a step when an inference is late: the correction stays where it is; *source* the sub-rate of Zhou 2017.
 
 use super::Inference;
 use crate::format::{Interpolation, MAX_OUTPUTS};

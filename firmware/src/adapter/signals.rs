@@ -60,8 +60,8 @@ pub(super) fn base_channels<const R: usize>(table: &Channels<'_>) -> [usize; R] 
     })
 }
 
-/// Refuses a model whose channels are not the application's, or do not fit into arrays of `limits` channels. Array elements behind the
-/// table's channels are not used.
+/// Refuses a model whose channels are not the application's, or do not fit into arrays of `limits` channels. Array elements
+/// behind the table's channels are not used.
 pub(super) fn same_signals(card: &Card<'_>, table: &Channels<'_>, limits: [usize; 3]) -> Result<(), Refusal> {
     let pairs = [
         ("desired", &card.signals.desired, table.desired),

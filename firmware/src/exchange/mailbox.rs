@@ -1,7 +1,8 @@
 //! The newest value.
 //!
-//! *in* values of one producer, each with a stamp; *out* the newest whole one at one consumer, or none while the producer, interrupted
-//! by the consumer, is half-way; *never* a torn value, a value twice, or a wait; *source* Boehm 2012, figure 6 (seqlock with fences).
+//! *in* values of one producer, each with a stamp; *out* the newest whole one at one consumer, or none while the producer,
+//! interrupted by the consumer, is half-way; *never* a torn value, a value twice, or a wait; *source* Boehm 2012, figure 6
+//! (seqlock with fences).
 
 use core::sync::atomic::{AtomicU32, Ordering, fence};
 

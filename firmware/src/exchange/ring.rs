@@ -1,7 +1,7 @@
 //! A queue of bytes.
 //!
-//! *in* bytes of one producer; *out* the same in order at one consumer; *never* an older byte overwritten: what does not fit is dropped
-//! and counted; *source* Lamport 1983, with free-running counters.
+//! *in* bytes of one producer; *out* the same in order at one consumer; *never* an older byte overwritten: what does not fit is
+//! dropped and counted; *source* Lamport 1983, with free-running counters.
 
 use core::sync::atomic::{AtomicU8, AtomicU32, AtomicUsize, Ordering};
 
@@ -113,7 +113,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_ring_is_a_bounded_queue(first in prop::sample::select(vec![0, usize::MAX - 5]), calls in prop::collection::vec((any::<bool>(), 0usize..6), 0..200)) {
+        fn a_ring_is_a_bounded_queue(
+            first in prop::sample::select(vec![0, usize::MAX - 5]),
+            calls in prop::collection::vec((any::<bool>(), 0usize..6), 0..200)
+        ) {
             let ring = ByteRing::<8>::new();
             // Counters that wrap change nothing.
             ring.put.store(first, Ordering::Relaxed);

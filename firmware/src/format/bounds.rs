@@ -1,12 +1,12 @@
 //! What the network lane can do inside of its training envelope, as proven when the file was made.
 //!
-//! *in* the bounds' section of the blob; *out* [`OutputBounds`] of each output; *never* numbers that contradict themselves, the probes or
-//! the limits; *source* `model-export`, which computes them: see its `bounds`.
+//! *in* the bounds' section of the blob; *out* [`OutputBounds`] of each output; *never* numbers that contradict themselves, the
+//! probes or the limits; *source* `model-export`, which computes them: see its `bounds`.
 //!
-//! The rule at load: bounds are finite, a low end is not above its high end, differences and slopes are not negative; a probe inside of
-//! the envelope gives an output between low and high; and no output's whole range lies beyond its limit (0 switches an output off):
-//! there the lane would be its own clamp and nothing else. A limit inside of the range is a decision, not an error: [`OutputBounds::reach`]
-//! says so. Outside of the envelope only the limits hold.
+//! The rule at load: bounds are finite, a low end is not above its high end, differences and slopes are not negative; a probe
+//! inside of the envelope gives an output between low and high; and no output's whole range lies beyond its limit (0 switches an
+//! output off): there the lane would be its own clamp and nothing else. A limit inside of the range is a decision, not an error:
+//! [`OutputBounds::reach`] says so. Outside of the envelope only the limits hold.
 
 use super::{Blob, Card, Floats, MAX_FEATURES, Refusal};
 use crate::math::abs;

@@ -124,8 +124,9 @@ pub struct Provenance<'a> {
 pub enum Interpolation {
     /// The value of the last sub-rate tick.
     Hold,
-    /// A ramp from this sub-rate tick's value to the next one's, which is evaluated a sub-rate period ahead. The desired trajectory is
-    /// known there; of measured channels and past references the newest stands in, so a model that reads them is better held.
+    /// A ramp from this sub-rate tick's value to the next one's, which is evaluated a sub-rate period ahead. The desired
+    /// trajectory is known there; of measured channels and past references the newest stands in, so a model that reads them is
+    /// better held.
     Linear,
 }
 
@@ -187,7 +188,8 @@ pub struct LayerLayout {
     pub outputs: u16,
     /// Activation.
     pub activation: Activation,
-    /// Integers only: largest magnitude of an input's code, 1..=32,767. The largest for which no accumulator can overflow is best.
+    /// Integers only: largest magnitude of an input's code, 1..=32,767. The largest for which no accumulator can overflow is
+    /// best.
     pub input_limit: u16,
     /// Biases, weights and requantisation of all rows: the stream in [`crate::network::kernel`].
     pub rows: Section,
@@ -212,7 +214,7 @@ pub struct NetworkLayout {
 
 /// One axis of the feedback lane.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct LaneAxis {
+pub struct FeedbackAxis {
     /// Index into [`Card::outputs`].
     pub output: u8,
     /// Errors that the axis reads: (measured channel, desired channel).
@@ -227,8 +229,8 @@ pub struct LaneAxis {
     pub integral_limit: f32,
 }
 
-/// Margins of the add-on's own loop, computed at design time on a model of longer memory than the one designed on. All finite: a margin
-/// that nothing limits is `f32::MAX`.
+/// Margins of the add-on's own loop, computed at design time on a model of longer memory than the one designed on. All finite: a
+/// margin that nothing limits is `f32::MAX`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Margins {
@@ -241,9 +243,9 @@ pub struct Margins {
 }
 
 /// How much of the fast clamps the lane may use, and how fast it integrates: 1 / (1 + v²), where v is the recent peak of
-/// Σ channel² / scale² + Σ error² / error_scale² (of each axis the first error), which decays by `decay` each tick. The lane is linear
-/// round calm flight: where much is desired of the loop, or where it has left the desired trajectory by more than a linear loop
-/// would, it must not pull as hard. A vehicle whose motors saturate would else be pulled into a tumble.
+/// Σ channel² / scale² + Σ error² / error_scale² (of each axis the first error), which decays by `decay` each tick. The lane is
+/// linear round calm flight: where much is desired of the loop, or where it has left the desired trajectory by more than a linear
+/// loop would, it must not pull as hard. A vehicle whose motors saturate would else be pulled into a tumble.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Authority {
@@ -259,11 +261,11 @@ pub struct Authority {
 
 /// The feedback lane.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct LaneLayout {
+pub struct FeedbackLayout {
     /// Lags of every error and of the past output.
     pub lags: u8,
     /// Axes.
-    pub axes: Vec<LaneAxis, MAX_AXES>,
+    pub axes: Vec<FeedbackAxis, MAX_AXES>,
     /// Authority over the fast clamps.
     pub authority: Authority,
     /// Worst margins over the axes.
@@ -277,12 +279,13 @@ pub struct MonitorAxis {
     pub error: (u8, u8),
     /// Indices into [`Card::outputs`]: the corrections that move the measured channel.
     pub inputs: Vec<u8, MAX_INPUTS>,
-    /// f32: of each input the mean of the measured channel over each monitor tick, newest first, after a correction of 1 that lasts one
-    /// monitor tick; in the measured channel's unit.
+    /// f32: of each input the mean of the measured channel over each monitor tick, newest first, after a correction of 1 that
+    /// lasts one monitor tick; in the measured channel's unit.
     pub taps: Section,
 }
 
-/// What the guard needs to tell whether the add-on does good: the error without it is the error less the loop's response to the correction.
+/// What the guard needs to tell whether the add-on does good: the error without it is the error less the loop's response to the
+/// correction.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MonitorLayout {
     /// Reference ticks in a monitor tick.
@@ -290,7 +293,7 @@ pub struct MonitorLayout {
     /// Monitor ticks that a response lasts.
     pub taps: u8,
     /// RMS over all axes of the error that validation flights showed with the add-on, in the errors' unit.
-    pub promise: f32,
+    pub validated_rms: f32,
     /// Axes; their errors have one unit.
     pub axes: Vec<MonitorAxis, MAX_AXES>,
 }
@@ -303,7 +306,7 @@ pub struct Probes {
     /// f32: `count` × features, then `count` × outputs of the network lane.
     pub network: Section,
     /// f32: the lane's output on each axis at the end of [`crate::feedback::PROBE_TICKS`] ticks of the standard error sequence.
-    pub lane: Section,
+    pub feedback: Section,
 }
 
 /// Everything about a model but its bulk numbers.
@@ -326,7 +329,7 @@ pub struct Card<'a> {
     /// Network lane.
     pub network: Option<NetworkLayout>,
     /// Feedback lane.
-    pub lane: Option<LaneLayout>,
+    pub feedback: Option<FeedbackLayout>,
     /// The loop's response, by which the guard judges the lanes.
     pub monitor: Option<MonitorLayout>,
     /// f32: smallest, then largest value of each feature in training.
@@ -355,11 +358,11 @@ impl Card<'_> {
             features: Vec::new(),
             outputs: Vec::new(),
             network: None,
-            lane: None,
+            feedback: None,
             monitor: None,
             envelope: section,
             bounds: section,
-            probes: Probes { count: 0, network: section, lane: section },
+            probes: Probes { count: 0, network: section, feedback: section },
         }
     };
 

@@ -1,7 +1,7 @@
 //! A card, field by field, where it shall stay.
 //!
-//! *in* the postcard bytes of a [`Card`]; *out* the card, and the bytes behind it; *never* another card than `postcard` makes of these bytes;
-//! *source* the fields of [`Card`] in their order.
+//! *in* the postcard bytes of a [`Card`]; *out* the card, and the bytes behind it; *never* another card than `postcard` makes of
+//! these bytes; *source* the fields of [`Card`] in their order.
 //!
 //! Serde returns what it decodes, and each level of it has a copy on the stack: 16 KB for a card of 3.
 
@@ -16,7 +16,8 @@ use super::{Card, Refusal};
 /// If the bytes are no card ([`Refusal::Card`]), or a list of it is longer than this build holds.
 pub(crate) fn card<'a>(mut bytes: &'a [u8], card: &mut Card<'a>) -> Result<&'a [u8], Refusal> {
     let rest = &mut bytes;
-    let Card { name, provenance, signals, timing, features, outputs, network, lane, monitor, envelope, bounds, probes } = card;
+    let Card { name, provenance, signals, timing, features, outputs, network, feedback, monitor, envelope, bounds, probes } =
+        card;
     take(rest, name)?;
     take(rest, provenance)?;
     list(rest, &mut signals.desired, "number of desired channels")?;
@@ -26,7 +27,7 @@ pub(crate) fn card<'a>(mut bytes: &'a [u8], card: &mut Card<'a>) -> Result<&'a [
     list(rest, features, "number of features")?;
     list(rest, outputs, "number of outputs")?;
     take(rest, network)?;
-    take(rest, lane)?;
+    take(rest, feedback)?;
     take(rest, monitor)?;
     take(rest, envelope)?;
     take(rest, bounds)?;
@@ -66,7 +67,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn damaged_and_whole_cards_are_what_postcard_says(which in 0usize..2, changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..3), keep in any::<prop::sample::Index>(), cut in any::<bool>()) {
+        fn damaged_and_whole_cards_are_what_postcard_says(
+            which in 0usize..2, changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..3),
+            keep in any::<prop::sample::Index>(), cut in any::<bool>()
+        ) {
             let models: [&[u8]; 2] =
                 [include_bytes!("../../tests/models/int8-lane.model"), include_bytes!("../../tests/models/float-skip.model")];
             let mut bytes = file::split(models[which]).unwrap().0.to_vec();

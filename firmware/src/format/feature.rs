@@ -1,4 +1,7 @@
 //! One network input as data; [`crate::features`] evaluates it.
+//!
+//! *in* the card's list; *out* values that name a signal, a channel and a time; *never* an evaluation; *source* Zhou 2017,
+//! Insights 2 and 3.
 
 use serde::{Deserialize, Serialize};
 

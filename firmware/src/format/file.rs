@@ -14,11 +14,12 @@
 //! | 24..32 | zero |
 //! | 32.. | the card ([`super::Card`] in postcard), then zeros up to a multiple of 16, then the blob |
 //!
-//! All numbers are little-endian. The card is the fields of [`super::Card`] in their order, without names: integers of more than a byte as
-//! varints, f32 in four bytes, texts and lists behind their length, an option behind 0 or 1, the variant of an enum as its number.
+//! All numbers are little-endian. The card is the fields of [`super::Card`] in their order, without names: integers of more than
+//! a byte as varints, f32 in four bytes, texts and lists behind their length, an option behind 0 or 1, the variant of an enum as
+//! its number.
 //!
-//! Sections of the blob, each at a multiple of 16 bytes, in the order in which `model-export` writes them (a reader goes by the card's
-//! offsets; f features, o outputs, sizes in words of four bytes):
+//! Sections of the blob, each at a multiple of 16 bytes, in the order in which `model-export` writes them (a reader goes by the
+//! card's offsets; f features, o outputs, sizes in words of four bytes):
 //!
 //! | section | words | content |
 //! |---|--:|---|
@@ -33,7 +34,8 @@
 //! | network probes | probes × (f + o) | f32 features of each probe, then outputs of each |
 //! | lane probe | axes | f32 outputs ([`crate::feedback::probe`]) |
 //!
-//! Version 2 is frozen: `tests/golden/models` holds the exact bytes of small models, which every build of this version reads and writes.
+//! Version 2 is frozen: `tests/golden/models` holds the exact bytes of small models, which every build of this version reads and
+//! writes.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 

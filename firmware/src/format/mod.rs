@@ -1,7 +1,7 @@
 //! What is stored of a model: the file's bytes, and the types that they become.
 //!
-//! *in* the bytes of a model file; *out* its [`Card`], and the numbers in bulk behind it, in place; *never* anything that is evaluated: networks,
-//! lanes and models stand above this module; *source* [`mod@file`] for the layout, [`Card`] for the fields.
+//! *in* the bytes of a model file; *out* its [`Card`], and the numbers in bulk behind it, in place; *never* anything that is
+//! evaluated: networks, lanes and models stand above this module; *source* [`mod@file`] for the layout, [`Card`] for the fields.
 
 mod blob;
 mod bounds;
@@ -9,12 +9,12 @@ mod card;
 pub(crate) mod decode;
 mod feature;
 pub mod file;
-mod place;
+mod file_buffer;
 mod refusal;
 
 pub use blob::{Blob, Floats, Words};
 pub use bounds::{Bounds, OutputBounds, Reach};
 pub use card::*;
 pub use feature::{Feature, Relative, Source};
-pub use place::Place;
+pub use file_buffer::FileBuffer;
 pub use refusal::Refusal;

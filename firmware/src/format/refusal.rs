@@ -1,4 +1,7 @@
 //! Why a model file is not flown.
+//!
+//! *in* what a check found; *out* a sentence that names it and says what to do; *never* a refusal without what was found;
+//! *source* the checks at load.
 
 use core::fmt;
 
@@ -146,7 +149,8 @@ impl fmt::Display for Refusal {
             Self::Length { expected, found } => {
                 write!(
                     f,
-                    "the header announces {expected} bytes, the file has {found}: it is truncated or has trailing bytes, copy it again"
+                    "the header announces {expected} bytes, the file has {found}: it is truncated or has trailing bytes, \
+                     copy it again"
                 )
             }
             Self::Checksum { stored, computed } => {
@@ -154,7 +158,8 @@ impl fmt::Display for Refusal {
             }
             Self::Card => write!(
                 f,
-                "the model card cannot be decoded: it is damaged, or made for a build that holds longer lists; export the model again with this build's model-export"
+                "the model card cannot be decoded: it is damaged, or made for a build that holds longer lists; \
+                 export the model again with this build's model-export"
             ),
             Self::Shape { what, found, limit } => write!(f, "{what} is {found}, possible is {limit}: train a model that fits"),
             Self::SectionLength { what, expected, found } => {
@@ -185,7 +190,8 @@ impl fmt::Display for Refusal {
             Self::Limit { output } => {
                 write!(
                     f,
-                    "whatever comes in, the network's output {output} lies beyond its limit and would only be clamped: raise the limit, or make it 0 to switch the output off"
+                    "whatever comes in, the network's output {output} lies beyond its limit and would only be clamped: \
+                     raise the limit, or make it 0 to switch the output off"
                 )
             }
             Self::Signal { signal, channel } => {

@@ -1,4 +1,7 @@
 //! The loop's response to corrections, checked: what [`crate::format::MonitorLayout`] points to.
+//!
+//! *in* a layout and the blob; *out* responses whose lengths are the layout's; *never* a divisor of 0; *source* the monitor that
+//! `model-export` writes.
 
 use heapless::Vec;
 
@@ -9,7 +12,7 @@ use crate::format::{Blob, Floats, MAX_AXES, MonitorAxis, MonitorLayout, Refusal}
 pub struct Monitor<'a> {
     divisor: u16,
     taps: usize,
-    promise: f32,
+    validated_rms: f32,
     axes: Vec<(MonitorAxis, Floats<'a>), MAX_AXES>,
 }
 
@@ -25,7 +28,7 @@ impl<'a> Monitor<'a> {
             let response = blob.floats(axis.taps, axis.inputs.len() * taps, "monitor taps")?;
             let _ = axes.push((axis.clone(), response));
         }
-        Ok(Self { divisor: layout.divisor.max(1), taps, promise: layout.promise, axes })
+        Ok(Self { divisor: layout.divisor.max(1), taps, validated_rms: layout.validated_rms, axes })
     }
 
     /// Reference ticks in a monitor tick.
@@ -39,8 +42,8 @@ impl<'a> Monitor<'a> {
     }
 
     /// RMS of the error that validation flights showed with the add-on.
-    pub fn promise(&self) -> f32 {
-        self.promise
+    pub fn validated_rms(&self) -> f32 {
+        self.validated_rms
     }
 
     /// The axes with their responses, input by input.

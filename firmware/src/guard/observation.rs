@@ -1,29 +1,30 @@
-//! What the guard is shown at a reference tick, and what it says.
+//! What the guard is shown at a reference tick, and what it decides.
 //!
-//! *in* the adapter's signals, corrections and inferences; *out* an [`Observation`] and a [`Verdict`]; *never* a second way to the guard within a
-//! tick; *source* what each of the guard's judges asks for.
+//! *in* the adapter's signals, corrections and inferences; *out* an [`Observation`] and a [`Verdict`]; *never* a second way to
+//! the guard within a tick; *source* what each of the guard's judges asks for.
 
 use super::{GuardSettings, Monitor};
 use crate::{
-    format::{Floats, LaneLayout, MAX_AXES, MAX_OUTPUTS},
+    format::{FeedbackLayout, Floats, MAX_AXES, MAX_OUTPUTS},
     lanes::Lanes,
 };
 
-/// What the lanes contributed to the correction of each output in a reference tick, in the output's unit. The first two add up to the
-/// correction.
+/// What the lanes contributed to the correction of each output in a reference tick, in the output's unit. The first two add up to
+/// the correction.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shares {
     /// The network lane's part.
     pub(crate) network: [f32; MAX_OUTPUTS],
     /// The feedback lane's part.
     pub(crate) feedback: [f32; MAX_OUTPUTS],
-    /// What the network lane would contribute alone and in full, within the limits.
-    pub(crate) alone: [f32; MAX_OUTPUTS],
+    /// What the network lane would contribute without the feedback lane and in full, within the limits.
+    pub(crate) network_only: [f32; MAX_OUTPUTS],
 }
 
 impl Shares {
     /// Nothing.
-    pub(crate) const NONE: Self = Self { network: [0.0; MAX_OUTPUTS], feedback: [0.0; MAX_OUTPUTS], alone: [0.0; MAX_OUTPUTS] };
+    pub(crate) const NONE: Self =
+        Self { network: [0.0; MAX_OUTPUTS], feedback: [0.0; MAX_OUTPUTS], network_only: [0.0; MAX_OUTPUTS] };
 }
 
 /// What the lanes did in a reference tick.
@@ -34,7 +35,7 @@ pub(crate) struct Outcome {
     /// Whether the network and the feedback lane asked for more than the bounds let pass.
     pub(crate) excess: [bool; 2],
     /// Whether the feedback lane was to act,
-    pub(crate) engaged: bool,
+    pub(crate) active: bool,
     /// and what it asked for on each of its axes, in the outputs' units.
     pub(crate) asked: [f32; MAX_AXES],
     /// Errors of the monitor's axes, in their unit.
@@ -44,7 +45,7 @@ pub(crate) struct Outcome {
 impl Outcome {
     /// Nothing: all zeros.
     pub(crate) const NONE: Self =
-        Self { shares: Shares::NONE, excess: [false; 2], engaged: false, asked: [0.0; MAX_AXES], errors: [0.0; MAX_AXES] };
+        Self { shares: Shares::NONE, excess: [false; 2], active: false, asked: [0.0; MAX_AXES], errors: [0.0; MAX_AXES] };
 }
 
 /// The network lane's features against the box of those in training.
@@ -76,7 +77,7 @@ impl Features {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Observation<'a> {
     /// The feedback lane of the model.
-    pub(crate) lane: Option<&'a LaneLayout>,
+    pub(crate) lane: Option<&'a FeedbackLayout>,
     /// The loop's response to corrections.
     pub(crate) monitor: Option<&'a Monitor<'a>>,
     /// Lanes that the user wants.

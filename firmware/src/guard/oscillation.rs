@@ -1,14 +1,16 @@
 //! The feedback lane's limit cycle.
 //!
-//! *in* what the lane asks for on each of its axes, at every reference tick; *out* whether it swings to and fro between its clamps; *never* more
-//! than one turn of an axis in a tick; *source* ours. A lane whose loop is unstable swings between its clamps several times a second, long before
-//! the error shows it: the vehicle is too slow to follow. At its clamps it damps nothing any more, and the next manoeuvre goes astray.
+//! *in* what the lane asks for on each of its axes, at every reference tick; *out* whether it swings to and fro between its
+//! clamps; *never* more than one turn of an axis in a tick. A lane whose loop is unstable swings between its
+//! clamps several times a second, long before the error shows it: the vehicle is too slow to follow. At its clamps it damps
+//! nothing any more, and the next manoeuvre goes astray.
 //!
-//! A turn is a way back of nearly the whole range between the clamps: what a lane does within a part of it, or where its authority is low,
-//! is none. Noise brings turns about too, but not as many, and not with the power of a lane that is hardly ever between its clamps.
+//! A turn is a way back of nearly the whole range between the clamps: what a lane does within a part of it, or where its
+//! authority is low, is none. Noise brings turns about too, but not as many, and not with the power of a lane that is hardly ever
+//! between its clamps.
 
-use super::{GuardSettings, watch::leak};
-use crate::format::{LaneLayout, MAX_AXES};
+use super::{GuardSettings, watch::ewma_gain};
+use crate::format::{FeedbackLayout, MAX_AXES};
 
 /// One axis.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +34,7 @@ pub(super) struct Oscillation {
 }
 
 impl Oscillation {
-    /// At rest.
+    /// Nothing seen yet: all zeros.
     pub(super) const NONE: Self =
         Self { axes: [Swing { extreme: 0.0, rising: false, mean: 0.0 }; MAX_AXES], turns: 0.0, power: 0.0 };
 
@@ -42,8 +44,8 @@ impl Oscillation {
     }
 
     /// Takes what the lane asks for at a reference tick.
-    pub(super) fn observe(&mut self, lane: &LaneLayout, wanted: &[f32; MAX_AXES], settings: &GuardSettings, rate_hz: f32) {
-        let recent = leak(1.0 / (settings.oscillation_s * rate_hz));
+    pub(super) fn observe(&mut self, lane: &FeedbackLayout, wanted: &[f32; MAX_AXES], settings: &GuardSettings, rate_hz: f32) {
+        let recent = ewma_gain(1.0 / (settings.oscillation_s * rate_hz));
         let (mut turns, mut power) = (0.0, 0.0);
         for ((axis, swing), wanted) in lane.axes.iter().zip(&mut self.axes).zip(wanted) {
             if axis.fast_limit <= 0.0 {
@@ -51,7 +53,7 @@ impl Oscillation {
             }
             let value = wanted / axis.fast_limit;
             // A mean over half the time follows what is slower than an oscillation.
-            swing.mean += (value - swing.mean) * leak(2.0 * recent);
+            swing.mean += (value - swing.mean) * ewma_gain(2.0 * recent);
             power += (value - swing.mean) * (value - swing.mean);
             let back = if swing.rising { swing.extreme - value } else { value - swing.extreme };
             if back >= settings.oscillation_swing {

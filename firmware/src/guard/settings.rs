@@ -1,56 +1,72 @@
 //! Settings of the guard, with defaults that were measured.
+//!
+//! *in* keys of a settings file, those of earlier versions too; *out* thresholds and times; *never* an unknown key; *source*
+//! validation flights, in which the defaults were measured.
 
 use serde::{Deserialize, Serialize};
 
-/// When lanes trip and come back. Those of evidence and oscillation trip lanes in validation strokes only where
-/// motors saturate (1.7 times the speed).
+/// When lanes trip and come back. The defaults of the counterfactual monitor and of the oscillation trip lanes in validation
+/// strokes only where motors saturate (1.7 times the speed).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[serde(default, deny_unknown_fields)]
 pub struct GuardSettings {
-    /// Whether the guard acts at all. Off for flights that judge what a lane does by itself.
+    /// Whether the guard trips lanes at all. It is off for flights that judge what a lane does by itself.
     pub enabled: bool,
-    /// Time for which a cause must be absent before its lane comes back, s.
+    /// Every cause must be absent for this time, s, before its lane comes back.
     pub hold_s: f32,
-    /// Time in which a lane that trips is faded out, s, if the model's own fade takes longer.
+    /// A lane that trips is faded out in this time, s, or in the model's own fade time if that is shorter.
     pub handover_s: f32,
-    /// Features may be this share of the training box' width outside of it,
+    /// A feature is outside of the training envelope if it leaves it by more than this share of the envelope's width and
+    /// [`GuardSettings::envelope_floor`] together.
     pub envelope_margin: f32,
-    /// and this much besides, in the feature's unit: a box can be flat.
+    /// A feature may leave the training envelope by this much, in its unit, in addition to the margin: an envelope can have no
+    /// width.
     pub envelope_floor: f32,
-    /// Sub-rate ticks in a row outside that trip.
+    /// The network lane trips after this many sub-rate ticks in a row with a feature outside; 0 counts as 1.
     pub envelope_ticks: u16,
-    /// Age of the measurement beyond the model's delay that trips, s.
+    /// Both lanes trip when the newest measurement is older than the model's measurement delay by more than this time, s.
     pub stale_s: f32,
-    /// Share of recent ticks in which a lane asks for more than limit and slew let pass that trips,
+    /// A lane trips when it asked for more than limit and slew let pass in more than this share of the recent ticks, 0..=1.
     pub saturated_share: f32,
-    /// and the time constant of what is recent, s.
+    /// The share of saturated ticks is an exponentially weighted mean with this time constant, s.
     pub saturated_s: f32,
-    /// Late inferences in a row that trip.
+    /// The network lane trips after this many inferences in a row that came too late; 0 counts as 1.
     pub late_in_a_row: u16,
-    /// The error with a lane may be this factor of what it would be without,
-    pub evidence_factor: f32,
-    /// with the network lane this one while the loop responds to the feedback lane too,
+    /// A lane trips when the RMS of the error with it is more than this factor of what it would be without the lane, beyond the
+    /// floor.
+    #[serde(alias = "evidence_factor")]
+    pub counterfactual_factor: f32,
+    /// The network lane is allowed this factor instead as long as the loop responds to the feedback lane too, which mends a part
+    /// of its mistakes.
     pub assisted_factor: f32,
-    /// and besides this many times what the model promises,
-    pub evidence_floor: f32,
-    /// and with the feedback lane this share of what it would be without any correction.
-    pub evidence_share: f32,
-    /// Time constant of the errors' energies, s,
-    pub evidence_s: f32,
-    /// and of the usual error without any correction, below which none counts as small, s.
-    pub usual_s: f32,
-    /// Trips by evidence after which a lane stays off until it is armed again.
-    pub evidence_trips: u16,
-    /// The feedback lane makes a turn when it comes back from its farthest value by this many times its fast clamp, of 2 at most;
+    /// An error below this many times the model's validated RMS trips no lane.
+    #[serde(alias = "evidence_floor")]
+    pub counterfactual_floor: f32,
+    /// The feedback lane is allowed this share of the error that there would be without any correction, in addition.
+    #[serde(alias = "evidence_share")]
+    pub counterfactual_share: f32,
+    /// The energies of the errors are exponentially weighted means with this time constant, s.
+    #[serde(alias = "evidence_s")]
+    pub counterfactual_s: f32,
+    /// The error without any correction counts as at least its long-term baseline, an exponentially weighted mean with this time
+    /// constant, s: in a moment of calm no error is large.
+    #[serde(alias = "usual_s")]
+    pub long_term_s: f32,
+    /// A lane stays off after this many trips by the counterfactual monitor, until it is armed again.
+    #[serde(alias = "evidence_trips")]
+    pub counterfactual_trips: u16,
+    /// The feedback lane makes a turn when what it asks for comes back from its farthest value by this many fast clamps, 2 at
+    /// most.
     pub oscillation_swing: f32,
-    /// it oscillates at more turns than this
+    /// The feedback lane oscillates if its recent turns, all axes added, are more than this, and its power is too.
     pub oscillation_turns: f32,
-    /// and more than this mean square, all axes added, in squares of their fast clamps,
+    /// The feedback lane oscillates if the mean square of what it asks for, around its mean, all axes added, is more than this,
+    /// in squares of the fast clamps, and its turns are too.
     pub oscillation_power: f32,
-    /// both forgotten with this time constant, s.
+    /// Turns and power are forgotten with this time constant, s.
     pub oscillation_s: f32,
-    /// Trips by oscillation after which the lane stays off until it is armed again: each return would swing again.
+    /// The feedback lane stays off after this many trips by oscillation, until it is armed again: each return would swing again.
     pub oscillation_trips: u16,
 }
 
@@ -70,13 +86,13 @@ impl GuardSettings {
         saturated_share: 0.0,
         saturated_s: 0.0,
         late_in_a_row: 0,
-        evidence_factor: 0.0,
+        counterfactual_factor: 0.0,
         assisted_factor: 0.0,
-        evidence_floor: 0.0,
-        evidence_share: 0.0,
-        evidence_s: 0.0,
-        usual_s: 0.0,
-        evidence_trips: 0,
+        counterfactual_floor: 0.0,
+        counterfactual_share: 0.0,
+        counterfactual_s: 0.0,
+        long_term_s: 0.0,
+        counterfactual_trips: 0,
         oscillation_swing: 0.0,
         oscillation_turns: 0.0,
         oscillation_power: 0.0,
@@ -95,13 +111,13 @@ impl GuardSettings {
         saturated_share: 0.5,
         saturated_s: 1.0,
         late_in_a_row: 5,
-        evidence_factor: 1.2,
+        counterfactual_factor: 1.2,
         assisted_factor: 2.0,
-        evidence_floor: 2.5,
-        evidence_share: 0.15,
-        evidence_s: 0.15,
-        usual_s: 4.0,
-        evidence_trips: 3,
+        counterfactual_floor: 2.5,
+        counterfactual_share: 0.15,
+        counterfactual_s: 0.15,
+        long_term_s: 4.0,
+        counterfactual_trips: 3,
         oscillation_swing: 1.9,
         oscillation_turns: 6.0,
         oscillation_power: 0.8,

@@ -1,9 +1,13 @@
 //! Why lanes trip, and how often they did.
+//!
+//! *in* the guard's decisions; *out* counts by reason and by lane; *never* another index for a reason in a later version;
+//! *source* the judges of the guard.
 
 /// Why a lane is off although it is wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 #[repr(u8)]
 pub enum Trip {
     /// Features outside of the training envelope (network lane).
@@ -15,7 +19,7 @@ pub enum Trip {
     /// A correction at its limit or slew for too long (each lane that asks for more).
     Saturated = 3,
     /// The loop would track better without the lane (each lane by itself).
-    Evidence = 4,
+    Counterfactual = 4,
     /// Inferences that come too late (network lane).
     Late = 5,
     /// A limit cycle (feedback lane).
@@ -25,7 +29,7 @@ pub enum Trip {
 impl Trip {
     /// All reasons, in the order of their indices.
     pub const ALL: [Self; 7] =
-        [Self::Envelope, Self::NotFinite, Self::Stale, Self::Saturated, Self::Evidence, Self::Late, Self::Oscillation];
+        [Self::Envelope, Self::NotFinite, Self::Stale, Self::Saturated, Self::Counterfactual, Self::Late, Self::Oscillation];
 
     /// Index in [`Trips`]; the same in every version.
     pub fn index(self) -> usize {
@@ -39,7 +43,7 @@ impl Trip {
             Self::NotFinite => "not_finite",
             Self::Stale => "stale",
             Self::Saturated => "saturated",
-            Self::Evidence => "evidence",
+            Self::Counterfactual => "counterfactual",
             Self::Late => "late",
             Self::Oscillation => "oscillation",
         }

@@ -1,4 +1,7 @@
 //! One lane's latch: trips at a cause, stays off while it lasts and for the hold time after it.
+//!
+//! *in* the cause that is present at a reference tick, if any; *out* whether the lane is off; *never* a second trip before the
+//! first has ended; *source* a latch with a hold time.
 
 use super::{GuardSettings, Trip};
 use crate::math::clamp;
@@ -8,7 +11,7 @@ use crate::math::clamp;
 pub(super) struct Watch {
     tripped: bool,
     /// Reference ticks that must pass without a cause.
-    rest: u32,
+    remaining: u32,
     /// Trips since it was armed that the lane itself is to blame for.
     strikes: u16,
     locked: bool,
@@ -16,13 +19,13 @@ pub(super) struct Watch {
 
 impl Watch {
     /// Free to act.
-    pub(super) const ARMED: Self = Self { tripped: false, rest: 0, strikes: 0, locked: false };
+    pub(super) const ARMED: Self = Self { tripped: false, remaining: 0, strikes: 0, locked: false };
 
     pub(super) fn tripped(&self) -> bool {
         self.tripped
     }
 
-    /// Forgets what was said against the lane; a running hold time goes on.
+    /// Clears what the lane itself was to blame for; a running hold time goes on.
     pub(super) fn unlock(&mut self) {
         (self.strikes, self.locked) = (0, false);
     }
@@ -30,17 +33,17 @@ impl Watch {
     /// One reference tick with the cause that is present, if any; returns it if it trips the lane now.
     pub(super) fn tick(&mut self, cause: Option<Trip>, hold: u32, settings: &GuardSettings) -> Option<Trip> {
         let Some(trip) = cause else {
-            self.rest = self.rest.saturating_sub(1);
-            self.tripped &= self.rest > 0 || self.locked;
+            self.remaining = self.remaining.saturating_sub(1);
+            self.tripped &= self.remaining > 0 || self.locked;
             return None;
         };
-        self.rest = hold.max(1);
+        self.remaining = hold.max(1);
         if self.tripped {
             return None;
         }
         self.tripped = true;
         let most = match trip {
-            Trip::Evidence => settings.evidence_trips,
+            Trip::Counterfactual => settings.counterfactual_trips,
             Trip::Oscillation => settings.oscillation_trips,
             _ => return Some(trip),
         };
@@ -50,7 +53,7 @@ impl Watch {
     }
 }
 
-/// A share of a first-order filter in a tick, within 0..=1; what is no number counts as 1.
-pub(super) fn leak(share: f32) -> f32 {
+/// Gain of an exponentially weighted moving average (EWMA) in a tick, within 0..=1; NaN counts as 1.
+pub(super) fn ewma_gain(share: f32) -> f32 {
     if share >= 0.0 { clamp(share, 0.0, 1.0) } else { 1.0 }
 }

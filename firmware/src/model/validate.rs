@@ -1,10 +1,13 @@
 //! Checks of a decoded card: every index exists, every number makes sense, every probe gives its bits.
+//!
+//! *in* a card, its blob, what was made of both; *out* nothing, or the first thing that is wrong; *never* an index, a number or a
+//! probe unchecked; *source* the fields of [`Card`].
 
 use crate::{
     feedback::{self, Lane},
     format::{
-        Blob, Bounds, Card, Floats, HISTORY, LaneLayout, MAX_ERRORS, MAX_FEATURES, MAX_LAGS, MAX_OUTPUTS, MAX_TAPS, MAX_WIDTH,
-        MonitorLayout, Refusal, Relative, Source,
+        Blob, Bounds, Card, FeedbackLayout, Floats, HISTORY, MAX_ERRORS, MAX_FEATURES, MAX_LAGS, MAX_OUTPUTS, MAX_TAPS,
+        MAX_WIDTH, MonitorLayout, Refusal, Relative, Source,
     },
     network::{Network, Scratch},
 };
@@ -33,7 +36,7 @@ pub(super) fn card(card: &Card<'_>) -> Result<(), Refusal> {
             }
         }
     }
-    card.lane.as_ref().map_or(Ok(()), |lane| self::lane(card, lane))?;
+    card.feedback.as_ref().map_or(Ok(()), |lane| self::lane(card, lane))?;
     card.monitor.as_ref().map_or(Ok(()), |monitor| self::monitor(card, monitor))
 }
 
@@ -108,7 +111,7 @@ fn outputs(card: &Card<'_>) -> Result<(), Refusal> {
     Ok(())
 }
 
-fn lane(card: &Card<'_>, lane: &LaneLayout) -> Result<(), Refusal> {
+fn lane(card: &Card<'_>, lane: &FeedbackLayout) -> Result<(), Refusal> {
     if lane.lags == 0 || usize::from(lane.lags) > MAX_LAGS {
         return Err(Refusal::Shape { what: "lane lags", found: lane.lags.into(), limit: MAX_LAGS as u32 });
     }
@@ -163,8 +166,8 @@ fn monitor(card: &Card<'_>, monitor: &MonitorLayout) -> Result<(), Refusal> {
     if monitor.divisor == 0 {
         return Err(Refusal::Value { what: "monitor divisor" });
     }
-    if !(monitor.promise.is_finite() && monitor.promise >= 0.0) {
-        return Err(Refusal::Value { what: "monitor promise" });
+    if !(monitor.validated_rms.is_finite() && monitor.validated_rms >= 0.0) {
+        return Err(Refusal::Value { what: "validated RMS of the monitor" });
     }
     for axis in &monitor.axes {
         let (measured, desired) = axis.error;
@@ -221,7 +224,7 @@ pub(super) fn network_probes<'a>(
 /// Re-runs the lane's probe: the bits must be the file's.
 #[inline(never)]
 pub(super) fn lane_probe(card: &Card<'_>, blob: &Blob<'_>, lane: &Lane<'_>) -> Result<(), Refusal> {
-    let expected = blob.floats(card.probes.lane, lane.axes().len(), "lane probe")?;
+    let expected = blob.floats(card.probes.feedback, lane.axes().len(), "lane probe")?;
     let found = feedback::probe(lane, 1.0 / card.timing.reference_rate_hz);
     let same = expected.iter().zip(found).all(|(expected, found)| expected.to_bits() == found.to_bits());
     if same { Ok(()) } else { Err(Refusal::Probe { index: u8::MAX }) }

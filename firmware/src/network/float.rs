@@ -1,4 +1,7 @@
 //! Dense layers in f32.
+//!
+//! *in* words of f32 bits; *out* the same of the next layer; *never* another order of operations than the kernel's; *source*
+//! [`super::kernel`].
 
 use super::{kernel, shape::ROWS};
 use crate::format::{Activation, Blob, LayerLayout, Refusal, Section};

@@ -1,8 +1,9 @@
 //! Dense layers with int8 or int16 weights, codes of at most 16 bits and 32-bit accumulators.
 //!
-//! A row's accumulator is Σ weight × code + bias, the weights in the units of [`super::kernel`]. A code never exceeds the limit that the
-//! card gives for the layer's inputs, and validation proves for every row that then no accumulator leaves 32 bits. A hidden layer turns
-//! it into a code with one rounded multiplication, (accumulator × multiplier + 2³¹) / 2³²; the last one into f32 with a scale.
+//! A row's accumulator is Σ weight × code + bias, the weights in the units of [`super::kernel`]. A code never exceeds the limit
+//! that the card gives for the layer's inputs, and validation proves for every row that then no accumulator leaves 32 bits. A
+//! hidden layer turns it into a code with one rounded multiplication, (accumulator × multiplier + 2³¹) / 2³²; the last one into
+//! f32 with a scale.
 
 use super::{
     kernel::{self, Finish, Width, portable},
@@ -107,7 +108,7 @@ impl<'a> Layer<'a> {
 /// 1.5 × 2²³: in the f32 above it the last bit is worth 1.
 const ROUNDING: f32 = 12_582_912.0;
 
-/// The nearest integer, halves to the even one, within ±`limit`. Not a number gives either limit.
+/// The nearest integer, halves to the even one, within ±`limit`. NaN gives either limit.
 #[inline(always)]
 fn code(value: f32, limit: i32) -> i16 {
     let integer = ((value + ROUNDING).to_bits() as i32).saturating_sub(ROUNDING.to_bits() as i32);

@@ -1,17 +1,18 @@
 //! Fixed-size feed-forward network: normalise, dense layers plus a linear skip, denormalise.
 //!
 //! *in* features in physical units; *out* corrections in physical units; *never* allocates, panics or gives other bits on another
-//! machine, or takes longer for other inputs; *source* Zhou 2017, section IV-A (dense layers); the linear skip from inputs to outputs is
-//! ours.
+//! machine, or takes longer for other inputs; *source* Zhou 2017, section IV-A (dense layers); the linear skip from inputs to
+//! outputs is ours.
 //!
 //! # The map
 //! With n = (x − mean) · (1 / scale) in f32, and d(·) the dense layers,
-//! output = (skip(n) + d(n)) · output scale + output mean. Float layers follow the order of operations in [`kernel`]. Integer layers:
+//! output = (skip(n) + d(n)) · output scale + output mean. Float layers follow the order of operations in [`kernel`]. Integer
+//! layers:
 //! 1. the inputs' codes are n · `input_code`, rounded to the nearest integer (halves to even), within ± the first layer's
 //!    [`input_limit`](crate::format::LayerLayout::input_limit);
-//! 2. a hidden layer's accumulator a, exact in 32 bits, becomes c = ⌊a · multiplier / 2³² + ½⌋. ReLU: c within 0..=L, L being the next
-//!    layer's limit. Linear: c within ±L. Tanh: c within 16 bits is a pre-activation in units of 1/[`TANH_INPUT_ONE`], [`tanh_code`]
-//!    makes a code of it, of which L is 1;
+//! 2. a hidden layer's accumulator a, exact in 32 bits, becomes c = ⌊a · multiplier / 2³² + ½⌋. ReLU: c within 0..=L, L being the
+//!    next layer's limit. Linear: c within ±L. Tanh: c within 16 bits is a pre-activation in units of 1/[`TANH_INPUT_ONE`],
+//!    [`tanh_code`] makes a code of it, of which L is 1;
 //! 3. the last layer's accumulators, as f32, times the scales of their rows.
 
 mod float;
@@ -50,8 +51,8 @@ pub struct Network<'a> {
 }
 
 impl<'a> Network<'a> {
-    /// Checks shapes and sections against `inputs` features and `outputs` corrections, and makes the network in `place`. After an error
-    /// there may be a part of one.
+    /// Checks shapes and sections against `inputs` features and `outputs` corrections, and makes the network in `place`. After an
+    /// error there may be a part of one.
     #[inline(never)]
     pub(crate) fn load(
         place: &mut Option<Self>,

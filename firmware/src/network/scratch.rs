@@ -1,4 +1,7 @@
 //! Working memory of an evaluation.
+//!
+//! *in* the size that a network needs; *out* room for the activations of two layers; *never* more than the widest network needs;
+//! *source* the limits in [`crate::format`].
 
 use super::shape::{INPUT_PADDING, ROWS, padded};
 use crate::format::{Arithmetic, MAX_FEATURES, MAX_WIDTH, NetworkLayout};
@@ -7,8 +10,8 @@ use crate::format::{Arithmetic, MAX_FEATURES, MAX_WIDTH, NetworkLayout};
 pub const MAX_SCRATCH: usize = 2 * MAX_WIDTH;
 const _: () = assert!(MAX_FEATURES <= MAX_WIDTH && MAX_WIDTH.is_multiple_of(ROWS));
 
-/// `WORDS` words for the activations of two layers. Without a number it serves any network; [`super::Network::scratch_words`] says how
-/// many one network needs (128 words, 512 bytes, for integer layers of 128 units).
+/// `WORDS` words for the activations of two layers. Without a number it serves any network; [`super::Network::scratch_words`]
+/// says how many one network needs (128 words, 512 bytes, for integer layers of 128 units).
 #[derive(Clone, Debug)]
 pub struct Scratch<const WORDS: usize = MAX_SCRATCH> {
     words: [u32; WORDS],

@@ -1,4 +1,7 @@
 //! How the kernels' rows and inputs are grouped.
+//!
+//! *in* numbers of outputs and inputs; *out* the same rounded up to whole blocks; *never* a block that is partly filled; *source*
+//! the streams of [`super::kernel`].
 
 use crate::format::MAX_OUTPUTS;
 

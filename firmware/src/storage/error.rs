@@ -1,4 +1,7 @@
 //! Why a model is not stored, or a slot not read.
+//!
+//! *in* what a check or the flash driver found; *out* a sentence that says what to do; *never* an error after which the other
+//! slot's model is lost; *source* the checks of [`super::Uploader`] and [`super::Stored`].
 
 use core::fmt;
 
@@ -9,6 +12,7 @@ use crate::format::Refusal;
 /// What the flash was asked to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Operation {
     /// Erase the slot.
     Erase,
@@ -28,8 +32,8 @@ impl fmt::Display for Operation {
     }
 }
 
-/// The reason, with what was found and expected. `Display` also says what to do. Whatever the reason, the model in the other slot is
-/// untouched.
+/// The reason, with what was found and expected. `Display` also says what to do. Whatever the reason, the model in the other slot
+/// is untouched.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -88,7 +92,7 @@ pub enum StorageError {
     /// The flash does not hold the header that was written.
     ReadBack,
     /// The slot holds no model.
-    Vacant,
+    Empty,
     /// The slot's header is damaged.
     Torn,
     /// The slot has another layout.
@@ -148,7 +152,7 @@ impl fmt::Display for StorageError {
             Self::Restart => write!(f, "a new model waits to be flown: restart before another upload"),
             Self::Flash { operation, kind } => write!(f, "the flash failed at {operation}: {kind}; upload the model again"),
             Self::ReadBack => write!(f, "the slot's header is not what was written: upload the model again"),
-            Self::Vacant => write!(f, "the slot holds no model: upload one"),
+            Self::Empty => write!(f, "the slot holds no model: upload one"),
             Self::Torn => write!(f, "the slot's header is damaged (an interrupted upload): upload the model again"),
             Self::Layout { found, expected } => {
                 write!(f, "the slot has layout {found}, this build reads {expected}: upload the model again")

@@ -1,7 +1,7 @@
 //! What stands before a stored model and makes it one.
 //!
-//! *in* [`HEADER`] bytes; *out* sequence number, length and check sum of the model behind them; *never* accepts a header that was torn or
-//! has a flipped bit; *source* this file is the layout's specification.
+//! *in* [`HEADER`] bytes; *out* sequence number, length and check sum of the model behind them; *never* accepts a header that was
+//! torn or has a flipped bit; *source* this file is the layout's specification.
 //!
 //! | bytes | content |
 //! |--:|---|
@@ -75,9 +75,9 @@ impl Header {
     /// # Errors
     /// If there is none, a damaged one or one of another layout.
     pub fn from_bytes(bytes: &[u8; HEADER]) -> Result<Self, StorageError> {
-        let Some((content, crc)) = bytes.split_last_chunk() else { return Err(StorageError::Vacant) };
+        let Some((content, crc)) = bytes.split_last_chunk() else { return Err(StorageError::Empty) };
         if !content.starts_with(&MAGIC) {
-            return Err(StorageError::Vacant);
+            return Err(StorageError::Empty);
         }
         if CRC.checksum(content) != u32::from_le_bytes(*crc) {
             return Err(StorageError::Torn);

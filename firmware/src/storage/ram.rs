@@ -9,10 +9,11 @@ use embedded_storage::nor_flash::{
 
 use super::Slot;
 
-/// A slot of `BYTES` bytes, erased as a whole and written byte by byte, as a sector of the STM32F405. What it holds is lost without power.
+/// A slot of `BYTES` bytes, erased as a whole and written byte by byte, as a sector of the STM32F405. What it holds is lost
+/// without power.
 ///
-/// A static of it should be [`RamFlash::written`], which start-up code clears: erased bytes are not zero, so they would take as much flash
-/// as RAM.
+/// A static of it should be [`RamFlash::written`], which start-up code clears: erased bytes are not zero, so they would take as
+/// much flash as RAM.
 #[derive(Clone, Debug)]
 #[repr(C, align(16))]
 pub struct RamFlash<const BYTES: usize>([u8; BYTES]);

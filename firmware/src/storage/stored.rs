@@ -1,7 +1,7 @@
 //! Which of two slots holds what.
 //!
-//! *in* the bytes of the slots; *out* the newest model that flies here, in place, and the slot that the next upload may overwrite; *never*
-//! a slot as spare that holds the model to be flown; *source* sequence numbers and check sums of [`Header`].
+//! *in* the bytes of the slots; *out* the newest model that flies here, in place, and the slot that the next upload may
+//! overwrite; *never* a slot as spare that holds the model to be flown; *source* sequence numbers and check sums of [`Header`].
 
 use super::{HEADER, Header, Sequence, StorageError};
 use crate::{
@@ -25,7 +25,7 @@ impl<'a> Stored<'a> {
     /// # Errors
     /// If it holds no model, or a damaged one. Shapes and probes are [`Model::from_bytes`]' affair.
     pub fn read(slot: &'a [u8]) -> Result<Self, StorageError> {
-        let (header, rest) = slot.split_first_chunk::<HEADER>().ok_or(StorageError::Vacant)?;
+        let (header, rest) = slot.split_first_chunk::<HEADER>().ok_or(StorageError::Empty)?;
         let Header { sequence, length, checksum } = Header::from_bytes(header)?;
         let file = rest.get(..length as usize).ok_or(StorageError::Length { length })?;
         let (card, _) = file::split(file)?;
@@ -61,14 +61,14 @@ impl<'a> Stored<'a> {
 
 /// One of the two slots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum SlotIndex {
     /// The first.
     First,
     /// The second.
     Second,
 }
 
-impl Place {
+impl SlotIndex {
     /// The other slot.
     pub fn other(self) -> Self {
         match self {
@@ -84,7 +84,7 @@ pub struct Survey<'a> {
     /// The newest model that is intact and passes every check.
     pub flies: Option<Stored<'a>>,
     /// The slot for the next upload. It does not hold the model that flies, nor, if none does, the newest intact one.
-    pub spare: Place,
+    pub spare: SlotIndex,
     /// Number of the next upload.
     pub sequence: Sequence,
 }
@@ -96,23 +96,24 @@ pub(super) fn examine(
     scratch: &mut Scratch,
     check: impl FnOnce(&Model<'_>) -> Result<(), Refusal>,
 ) -> Result<(), Refusal> {
-    let mut place = Model::VACANT;
+    let mut place = Model::EMPTY;
     check(Model::load_into(&mut place, file, scratch)?)
 }
 
-/// Looks at both slots; `check` says whether a model fits the application (signals, rate, preview). The scratch is for the probes.
+/// Looks at both slots; `check` says whether a model fits the application (signals, rate, preview). The scratch is for the
+/// probes.
 pub fn survey<'a>(slots: [&'a [u8]; 2], scratch: &mut Scratch, check: impl Fn(&Model<'_>) -> Result<(), Refusal>) -> Survey<'a> {
     let [first, second] = slots.map(|slot| Stored::read(slot).ok());
     let newest_first = match (first, second) {
-        (Some(a), Some(b)) if b.sequence.is_newer_than(a.sequence) => [(Place::Second, second), (Place::First, first)],
-        _ => [(Place::First, first), (Place::Second, second)],
+        (Some(a), Some(b)) if b.sequence.is_newer_than(a.sequence) => [(SlotIndex::Second, second), (SlotIndex::First, first)],
+        _ => [(SlotIndex::First, first), (SlotIndex::Second, second)],
     };
     let intact = newest_first.into_iter().filter_map(|(place, stored)| Some((place, stored?)));
     let newest = intact.clone().next();
     let flies = intact.clone().find(|(_, stored)| examine(stored.file, scratch, &check).is_ok());
     Survey {
         flies: flies.map(|(_, stored)| stored),
-        spare: flies.or(newest).map_or(Place::First, |(place, _)| place.other()),
+        spare: flies.or(newest).map_or(SlotIndex::First, |(place, _)| place.other()),
         sequence: newest.map_or(Sequence(0), |(_, stored)| stored.sequence.next()),
     }
 }

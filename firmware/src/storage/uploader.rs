@@ -1,7 +1,8 @@
 //! A model on its way into a slot.
 //!
-//! *in* announcement, chunks and the word to commit, from whatever link; *out* acknowledgements, at last the stored model; *never* a write
-//! while armed, nor a header before a model that this machine would fly; *source* the two-slot update with a commit record written last.
+//! *in* announcement, chunks and the word to commit, from whatever link; *out* acknowledgements, at last the stored model;
+//! *never* a write while armed, nor a header before a model that this machine would fly; *source* the two-slot update with a
+//! commit record written last.
 
 use super::{HEADER, Header, Operation, Sequence, Slot, StorageError, Stored, stored::examine};
 use crate::{
@@ -13,8 +14,8 @@ use crate::{
 /// Bytes that are collected for one write to the flash: a multiple of every driver's granularity.
 const BLOCK: usize = HEADER;
 
-/// Whether the motors may turn. The flash is written only while they may not: the core of a microcontroller with one bank of flash
-/// stands still until it has been erased, which takes seconds.
+/// Whether the motors may turn. The flash is written only while they may not: the core of a microcontroller with one bank of
+/// flash stands still until it has been erased, which takes seconds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arming {
     /// The motors are off.
@@ -38,8 +39,8 @@ enum State {
 
 /// Writes models into a spare slot.
 ///
-/// Every message may be repeated, as by a peer whose acknowledgement was lost. An error of the flash and a refused model end the upload:
-/// it is begun again, and the slot erased. What a refused chunk or an armed vehicle leaves can go on.
+/// Every message may be repeated, as by a peer whose acknowledgement was lost. An error of the flash and a refused model end the
+/// upload: it is begun again, and the slot erased. What a refused chunk or an armed vehicle leaves can go on.
 #[derive(Debug)]
 pub struct Uploader<S> {
     slot: S,
@@ -56,8 +57,8 @@ impl<S: Slot> Uploader<S> {
         Self { slot, sequence, state: State::Idle, block: [0xff; BLOCK] }
     }
 
-    /// Begins the upload of a model of `length` bytes with this check sum ([`Model::checksum`]): erases the slot. Gives the offset of
-    /// the next byte that is expected: if the same upload had begun before, it goes on.
+    /// Begins the upload of a model of `length` bytes with this check sum ([`Model::checksum`]): erases the slot. Gives the
+    /// offset of the next byte that is expected: if the same upload had begun before, it goes on.
     ///
     /// # Errors
     /// If armed, if the model does not fit, if one was committed, or if the flash fails.
@@ -81,8 +82,8 @@ impl<S: Slot> Uploader<S> {
         Ok(0)
     }
 
-    /// Takes the chunk at `offset` of the file and gives the offset of the next byte that is expected. What was received before is
-    /// acknowledged and not written again.
+    /// Takes the chunk at `offset` of the file and gives the offset of the next byte that is expected. What was received before
+    /// is acknowledged and not written again.
     ///
     /// # Errors
     /// If armed, if no upload has begun, if the chunk leaves a gap or reaches beyond the end, or if the flash fails.
@@ -110,8 +111,9 @@ impl<S: Slot> Uploader<S> {
         Ok(received)
     }
 
-    /// Checks what the flash now holds and makes it the newest model: complete, the announced check sum, [`Model::from_bytes`] with its
-    /// probes on this machine in `scratch`, and `check` (signals, rate, preview of the application). Only then the header is written, and read back.
+    /// Checks what the flash now holds and makes it the newest model: complete, the announced check sum, [`Model::from_bytes`]
+    /// with its probes on this machine in `scratch`, and `check` (signals, rate, preview of the application). Only then the
+    /// header is written, and read back.
     ///
     /// The model flies from the next [`super::open`] on.
     ///

@@ -3,7 +3,7 @@
 use impromptu_firmware::{
     model::{Model, Refusal},
     network::Scratch,
-    storage::{HEADER, Header, Place, Sequence, Slot, StorageError, Stored, survey},
+    storage::{HEADER, Header, Sequence, Slot, SlotIndex, StorageError, Stored, survey},
 };
 
 use crate::{
@@ -29,7 +29,7 @@ fn every_flipped_bit_is_found_and_the_other_model_flies() {
     for bit in 0..8 * (HEADER + FLOAT.len()) {
         newer.flip(bit);
         assert!(Stored::read(newer.bytes()).is_err(), "bit {bit}");
-        for (slots, spare) in [([&older, &newer], Place::Second), ([&newer, &older], Place::First)] {
+        for (slots, spare) in [([&older, &newer], SlotIndex::Second), ([&newer, &older], SlotIndex::First)] {
             let found = survey(slots.map(Slot::bytes), &mut Scratch::new(), anything);
             assert_eq!((found.flies.unwrap().file(), found.spare, found.sequence), (INTEGER, spare, Sequence(2)), "bit {bit}");
         }
@@ -51,7 +51,7 @@ fn a_stored_model_tells_its_name_and_check_sum() {
 fn the_newest_model_flies_also_after_the_last_number() {
     for number in [0, 7, i32::MAX as u32, u32::MAX] {
         let (older, newer) = (slot(number, FLOAT), slot(number.wrapping_add(1), INTEGER));
-        for (slots, spare) in [([&older, &newer], Place::First), ([&newer, &older], Place::Second)] {
+        for (slots, spare) in [([&older, &newer], SlotIndex::First), ([&newer, &older], SlotIndex::Second)] {
             let found = survey(slots.map(Slot::bytes), &mut Scratch::new(), anything);
             let expected = (INTEGER, spare, Sequence(number.wrapping_add(2)));
             assert_eq!((found.flies.unwrap().file(), found.spare, found.sequence), expected);
@@ -66,7 +66,7 @@ fn a_newer_model_that_does_not_fly_here_is_passed_over() {
     for bad in [with_wrong_probe(), named(b"third")] {
         let bad = slot(2, &bad);
         let found = survey([good.bytes(), bad.bytes()], &mut Scratch::new(), unwanted);
-        assert_eq!((found.flies.unwrap().file(), found.spare, found.sequence), (FLOAT, Place::Second, Sequence(3)));
+        assert_eq!((found.flies.unwrap().file(), found.spare, found.sequence), (FLOAT, SlotIndex::Second, Sequence(3)));
     }
 }
 
@@ -74,17 +74,17 @@ fn a_newer_model_that_does_not_fly_here_is_passed_over() {
 fn where_nothing_flies_the_newest_intact_model_is_kept() {
     let slots = [slot(5, FLOAT), slot(4, INTEGER)];
     let found = survey(slots.each_ref().map(Slot::bytes), &mut Scratch::new(), servo);
-    assert_eq!((found.flies, found.spare, found.sequence), (None, Place::Second, Sequence(6)));
+    assert_eq!((found.flies, found.spare, found.sequence), (None, SlotIndex::Second, Sequence(6)));
     let slots = [Flash::new(&Supply::new()), slot(4, INTEGER)];
     let found = survey(slots.each_ref().map(Slot::bytes), &mut Scratch::new(), servo);
-    assert_eq!((found.flies, found.spare, found.sequence), (None, Place::First, Sequence(5)));
+    assert_eq!((found.flies, found.spare, found.sequence), (None, SlotIndex::First, Sequence(5)));
 }
 
 #[test]
 fn what_is_wrong_with_a_slot_is_named() {
     let read = |slot: &Flash| Stored::read(slot.bytes()).unwrap_err();
-    assert_eq!(read(&Flash::new(&Supply::new())), StorageError::Vacant);
-    assert_eq!(Stored::read(&[0xff; HEADER - 1]), Err(StorageError::Vacant));
+    assert_eq!(read(&Flash::new(&Supply::new())), StorageError::Empty);
+    assert_eq!(Stored::read(&[0xff; HEADER - 1]), Err(StorageError::Empty));
     let mut torn = slot(1, FLOAT);
     torn.flip(8 * 13);
     assert_eq!(read(&torn), StorageError::Torn);

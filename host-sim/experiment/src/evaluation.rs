@@ -157,7 +157,7 @@ pub fn model_card(built: &Built, plant: &Loop) -> Result<ModelCard, ExportError>
     let difference = verify::difference(&model, network, &built.learned.rows.calibration);
     let position = &difference.rms[..3.min(difference.rms.len())];
     let square = position.iter().map(|rms| rms * rms).sum::<f64>();
-    let lane_parameters = model.lane().map_or(0, |lane| lane.multiply_adds());
+    let lane_parameters = model.feedback().map_or(0, |lane| lane.multiply_adds());
     Ok(ModelCard {
         name: card.name.into(),
         vehicle: plant.vehicle.name.clone(),
@@ -167,7 +167,7 @@ pub fn model_card(built: &Built, plant: &Loop) -> Result<ModelCard, ExportError>
         crc32: model.checksum(),
         parameters: (dense + skip) as u64 + u64::from(lane_parameters),
         multiply_adds: u64::from(model.network().map_or(0, |network| network.multiply_adds())) + u64::from(lane_parameters),
-        margins: card.lane.as_ref().map(|lane| Margins {
+        margins: card.feedback.as_ref().map(|lane| Margins {
             delay_ms: lane.margins.delay_ms.into(),
             gain: lane.margins.gain.into(),
             modulus: lane.margins.modulus.into(),

@@ -111,7 +111,7 @@ impl Flights<'_> {
         let model = file.model()?;
         let mut flights = self.scored(Method::Baseline, self.baseline);
         for (network, feedback) in [(true, false), (false, true), (true, true)] {
-            if (network && model.network().is_none()) || (feedback && model.lane().is_none()) {
+            if (network && model.network().is_none()) || (feedback && model.feedback().is_none()) {
                 continue;
             }
             let lanes = Lanes { network, feedback };

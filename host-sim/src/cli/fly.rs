@@ -139,7 +139,7 @@ impl Fly {
         }
         if let (Some(model), Some(file)) = (&model, &file)
             && self.lanes.lanes().feedback
-            && model.lane().is_none()
+            && model.feedback().is_none()
         {
             if self.lanes == LaneChoice::Feedback {
                 bail!("{}: has no feedback lane; give --lanes network", file.name());

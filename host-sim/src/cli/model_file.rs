@@ -64,7 +64,7 @@ pub(super) fn method(model: &Model<'_>, lanes: Lanes) -> Method {
         Some(_) => [Method::NetInt8, Method::FullInt8],
         None => [Method::Baseline, Method::Feedback],
     };
-    match (lanes.network, lanes.feedback && model.lane().is_some()) {
+    match (lanes.network, lanes.feedback && model.feedback().is_some()) {
         (true, true) => with_feedback,
         (true, false) => alone,
         (false, true) => Method::Feedback,

@@ -77,7 +77,7 @@ fn without_a_vehicle_or_without_dither_the_model_has_no_feedback_lane_and_says_w
     assert!(trained["refusal"].as_str().unwrap().contains("--vehicle"), "{trained}");
     let bytes = folder.read("models/model.impromptu");
     let model = Model::from_bytes(&bytes).unwrap();
-    assert!(model.lane().is_none() && model.card().provenance.remarks.contains("--vehicle"));
+    assert!(model.feedback().is_none() && model.card().provenance.remarks.contains("--vehicle"));
     assert_eq!(model.card().timing.measurement_delay_ticks, 3.0);
 
     let trained = train(&folder, "--vehicle crazyflie --out models");

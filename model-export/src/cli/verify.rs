@@ -74,7 +74,7 @@ impl Verify {
         let verified = Verified {
             crc: format!("{:08x}", model.checksum()),
             network_probes: if model.network().is_some() { model.card().probes.count } else { 0 },
-            feedback_lane_probes: model.lane().map_or(0, |lane| lane.axes().len()),
+            feedback_lane_probes: model.feedback().map_or(0, |lane| lane.axes().len()),
             comparison,
             failures,
             file: self.file,

@@ -87,7 +87,9 @@ fn without_a_model_the_reference_is_the_desired_one() {
     assert_eq!(bits(add_on.step(0, &[f32::NAN, 1.0], &mut Scratch::new())), bits([1.5, -0.0]));
     // The end rules are those of the table: the position holds, the velocity vanishes.
     assert_eq!(add_on.step(1, &[0.0; 2], &mut Scratch::new()), [1.5, 0.0]);
-    assert!(add_on.guard().is_none() && add_on.report() == Report { next_tick: 1, ..Default::default() });
+    let mut report = Report::default();
+    report.next_tick = 1;
+    assert!(add_on.guard().is_none() && add_on.report() == report);
     // A table in another order is followed by its names.
     let swapped = [table.reference[1], table.reference[0]];
     let signals = Channels { reference: &swapped, ..Channels::from(&table) };

@@ -14,7 +14,7 @@ fn a_valid_file_loads() {
     for precision in [Precision::Float, Precision::Int8] {
         let bytes = small_model(precision);
         let model = Model::from_bytes(&bytes).unwrap();
-        assert!(model.network().is_some() && model.lane().is_some());
+        assert!(model.network().is_some() && model.feedback().is_some());
         assert_eq!(model.card().probes.count, 4);
     }
 }
@@ -94,7 +94,7 @@ fn load(bytes: &[u8]) {
             network.evaluate(&[input; 3], &mut outputs, &mut Scratch::new());
         }
     }
-    if let Some(lane) = model.lane() {
+    if let Some(lane) = model.feedback() {
         let _ = impromptu_firmware::feedback::probe(lane, 1.0);
     }
 }

@@ -55,9 +55,9 @@ fn corrections(
 fn outputs(lane: LaneDescription, errors: impl IntoIterator<Item = [f32; 2]>) -> Vec<f32> {
     let (_, bytes) = lane_only(lane, 0.0);
     let model = Model::from_bytes(&bytes).unwrap();
-    let lane = model.lane().unwrap();
+    let lane = model.feedback().unwrap();
     let axis = &lane.axes()[0];
-    let mut state = AxisState::REST;
+    let mut state = AxisState::EMPTY;
     let step = |errors| {
         let output = state.step(lane, axis, errors, 1.0, 0.01, true);
         state.applied(lane, output);

@@ -121,7 +121,7 @@ fn each_lane_trips_alone() {
         ..calm(Lanes { network: true, feedback: false })
     };
     let flight = fly(guarded(), [0.1, 0.0], GuardSettings::default(), 200, away);
-    assert_eq!(flight[199].trips, only(Trip::Evidence, [1, 0]));
+    assert_eq!(flight[199].trips, only(Trip::Counterfactual, [1, 0]));
     // The feedback lane's correction does.
     let swing = |tick: i32| Doing { measured: [1.0 - if (tick / 20) % 2 == 0 { 0.1 } else { -0.1 }, 0.0], ..calm(Lanes::BOTH) };
     let mut description = guarded();
@@ -129,7 +129,7 @@ fn each_lane_trips_alone() {
     description.feedback_lane = Some(lane([vec![0.5], vec![0.0]], vec![0.0], 0.0));
     description.monitor.as_mut().unwrap().axes[0].taps = vec![vec![2.0]];
     let flight = fly(description, [0.0, 0.0], GuardSettings::default(), 200, swing);
-    assert_eq!(flight[199].trips, only(Trip::Evidence, [0, 1]));
+    assert_eq!(flight[199].trips, only(Trip::Counterfactual, [0, 1]));
     // Features outside of the box concern the network.
     let far = |tick: i32| Doing {
         desired: [if tick < 100 { 0.0 } else { 10.0 * (tick - 99) as f32 }, 0.0],
@@ -175,7 +175,7 @@ fn what_the_evidence_speaks_against_again_and_again_stays_off_until_it_is_armed(
     let lanes = |tick: i32| if (2500..2510).contains(&tick) { Lanes::NONE } else { Lanes { network: false, feedback: true } };
     let doing = |tick: i32| Doing { measured: [1.0 - if (tick / 20) % 2 == 0 { 0.1 } else { -0.1 }, 0.0], ..calm(lanes(tick)) };
     let flight = fly(description, [0.0, 0.0], GuardSettings { hold_s: 1.0, ..GuardSettings::default() }, 3000, doing);
-    assert_eq!(flight[2400].trips, only(Trip::Evidence, [0, 3]));
+    assert_eq!(flight[2400].trips, only(Trip::Counterfactual, [0, 3]));
     assert!(!flight[2499].acting.feedback && flight[2515].acting.feedback);
     assert!(flight[2999].trips.by_lane()[1] > 3);
 }

@@ -80,14 +80,14 @@ fn indices() {
             ),
             case!(
                 "lane output",
-                |c, _b| c.lane.as_mut().unwrap().axes[0].output = 2,
+                |c, _b| c.feedback.as_mut().unwrap().axes[0].output = 2,
                 Refusal::Index { .. },
                 "lane output names index 2"
             ),
             case!(
                 "lane output twice",
                 |c, _b| {
-                    let lane = c.lane.as_mut().unwrap();
+                    let lane = c.feedback.as_mut().unwrap();
                     let axis = lane.axes[0].clone();
                     lane.axes.push(axis).unwrap()
                 },
@@ -96,13 +96,13 @@ fn indices() {
             ),
             case!(
                 "lane measured",
-                |c, _b| c.lane.as_mut().unwrap().axes[0].errors[0].0 = 2,
+                |c, _b| c.feedback.as_mut().unwrap().axes[0].errors[0].0 = 2,
                 Refusal::Index { .. },
                 "lane measured channel names index 2"
             ),
             case!(
                 "lane desired",
-                |c, _b| c.lane.as_mut().unwrap().axes[0].errors[1].1 = 200,
+                |c, _b| c.feedback.as_mut().unwrap().axes[0].errors[1].1 = 200,
                 Refusal::Index { .. },
                 "lane desired channel names index 200"
             ),

@@ -104,14 +104,14 @@ fn either_lane_works_alone() {
     lane_only.feedback_lane = Some(lane([vec![-1.0], vec![-0.4]], vec![0.0], -0.5));
     let bytes = encode(&lane_only, None, Precision::Int8, &[]).unwrap();
     let model = Model::from_bytes(&bytes).unwrap();
-    assert!(model.network().is_none() && model.lane().is_some());
+    assert!(model.network().is_none() && model.feedback().is_some());
     assert_eq!(model.card().probes.count, 0);
 
     let mut numbers = Numbers(3);
     let float = network(&mut numbers, 3, &[(4, Activation::Relu)], 2, false);
     let bytes = encode(&description(3), Some(&float), Precision::Float, &[]).unwrap();
     let model = Model::from_bytes(&bytes).unwrap();
-    assert!(model.network().is_some() && model.lane().is_none());
+    assert!(model.network().is_some() && model.feedback().is_none());
     assert_eq!(model.card().probes.count, 3, "without rows the envelope gives the probes");
 }
 

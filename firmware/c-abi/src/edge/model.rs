@@ -32,7 +32,7 @@ pub unsafe extern "C" fn impromptu_model_create(model: *mut ModelMemory, size: u
     // SAFETY: the module's rules.
     unsafe {
         create::<Model<'static>>(model, size, |place| {
-            place.write(Model::VACANT);
+            place.write(Model::EMPTY);
             Model::load_into(&mut *place, bytes, &mut Scratch::new())?;
             Ok(())
         })

@@ -1,7 +1,7 @@
 //! A piece of a model upload on its way to the task that may wait for the flash.
 //!
-//! *in* the link's model commands; *out* words for a mailbox, and back, and the outcome once carried out; *never* other bytes than were
-//! sent; *source* ours.
+//! *in* the link's model commands; *out* words for a mailbox, and back, and the outcome once carried out; *never* other bytes
+//! than were sent.
 
 use impromptu_firmware::{
     model::{Model, Refusal},
@@ -58,8 +58,9 @@ impl Upload {
         self.words[0] & 0xff == COMMIT
     }
 
-    /// Carries the command out, which may take seconds; the motors must be off until it returns ([`super::Application::hear`] sees to
-    /// that). `scratch` and `check` as for [`Uploader::commit`]. A beginning of what had begun before is answered with the offset where it goes on.
+    /// Carries the command out, which may take seconds; the motors must be off until it returns ([`super::Application::on_byte`]
+    /// sees to that). `scratch` and `check` as for [`Uploader::commit`]. A beginning of what had begun before is answered with
+    /// the offset where it goes on.
     pub fn carry_out<S: Slot>(
         &self,
         uploader: &mut Uploader<S>,
@@ -99,14 +100,14 @@ impl Upload {
         Self { sequence: (words[0] >> 8) as u8, words }
     }
 
-    /// Gives the command, whose bytes are put into `bulk`, to `obey`.
-    pub fn with<T>(&self, obey: impl FnOnce(Command<'_>) -> T) -> T {
+    /// Gives the command, whose bytes are put into `bulk`, to `handle`.
+    pub fn with<T>(&self, handle: impl FnOnce(Command<'_>) -> T) -> T {
         let [head, first, second, bulk @ ..] = &self.words;
         let mut bytes = [0; CHUNK];
         for (place, word) in bytes.as_chunks_mut().0.iter_mut().zip(bulk) {
             *place = word.to_le_bytes();
         }
-        obey(match head & 0xff {
+        handle(match head & 0xff {
             BEGIN => Command::ModelBegin { length: *first, checksum: *second },
             CHUNK_KIND => {
                 let bytes = bytes.get(..*second as usize).unwrap_or_default();
@@ -165,7 +166,7 @@ mod tests {
     const MODEL: &[u8] = include_bytes!("../../tests/models/int8-lane.model");
 
     /// The command's outcome, by way of both mailboxes.
-    fn obey<S: Slot>(uploader: &mut Uploader<S>, command: Command<'_>) -> Outcome {
+    fn handle<S: Slot>(uploader: &mut Uploader<S>, command: Command<'_>) -> Outcome {
         let upload = Upload::from_words(*Upload::new(1, &command).unwrap().words());
         let outcome = upload.carry_out(uploader, &mut Scratch::new(), |_| Ok(()));
         assert_eq!(outcome_from_words(outcome_words(&outcome)), Some(outcome));
@@ -182,21 +183,21 @@ mod tests {
             Command::ModelChunk(ModelChunk { offset: offset as u32, bytes })
         };
         let refused = Outcome::Refused;
-        assert_eq!(obey(&mut uploader, Command::ModelCommit), refused(Reason::NoModel));
+        assert_eq!(handle(&mut uploader, Command::ModelCommit), refused(Reason::NoModel));
         assert_eq!(
-            obey(&mut uploader, Command::ModelBegin { length: 5000, checksum: 0 }),
+            handle(&mut uploader, Command::ModelBegin { length: 5000, checksum: 0 }),
             refused(Reason::Length { limit: 4064 })
         );
-        assert_eq!(obey(&mut uploader, begin), Outcome::Done);
-        assert_eq!(obey(&mut uploader, chunk(CHUNK)), refused(Reason::Offset { expected: 0 }));
-        assert_eq!(obey(&mut uploader, chunk(0)), Outcome::Done);
-        assert_eq!(obey(&mut uploader, begin), refused(Reason::Offset { expected: CHUNK as u32 }));
-        assert_eq!(obey(&mut uploader, Command::ModelCommit), refused(Reason::Offset { expected: CHUNK as u32 }));
+        assert_eq!(handle(&mut uploader, begin), Outcome::Done);
+        assert_eq!(handle(&mut uploader, chunk(CHUNK)), refused(Reason::Offset { expected: 0 }));
+        assert_eq!(handle(&mut uploader, chunk(0)), Outcome::Done);
+        assert_eq!(handle(&mut uploader, begin), refused(Reason::Offset { expected: CHUNK as u32 }));
+        assert_eq!(handle(&mut uploader, Command::ModelCommit), refused(Reason::Offset { expected: CHUNK as u32 }));
         for offset in (CHUNK..MODEL.len()).step_by(CHUNK) {
-            assert_eq!(obey(&mut uploader, chunk(offset)), Outcome::Done);
+            assert_eq!(handle(&mut uploader, chunk(offset)), Outcome::Done);
         }
-        assert_eq!(obey(&mut uploader, Command::ModelCommit), Outcome::Done);
-        assert_eq!(obey(&mut uploader, begin), refused(Reason::Busy), "until the restart");
+        assert_eq!(handle(&mut uploader, Command::ModelCommit), Outcome::Done);
+        assert_eq!(handle(&mut uploader, begin), refused(Reason::Busy), "until the restart");
         assert_eq!(storage::open(&mut slots, |_| Ok(())).0.unwrap().file(), MODEL);
     }
 
@@ -206,14 +207,16 @@ mod tests {
         let (_, mut uploader) = storage::open(&mut slots, |_| Ok(()));
         let bytes = &[7; 40];
         let checksum = file::checksum(bytes);
-        obey(&mut uploader, Command::ModelBegin { length: 40, checksum });
-        obey(&mut uploader, Command::ModelChunk(ModelChunk { offset: 0, bytes }));
-        assert_eq!(obey(&mut uploader, Command::ModelCommit), Outcome::Refused(Reason::Model(ModelFault::Damaged)));
+        handle(&mut uploader, Command::ModelBegin { length: 40, checksum });
+        handle(&mut uploader, Command::ModelChunk(ModelChunk { offset: 0, bytes }));
+        assert_eq!(handle(&mut uploader, Command::ModelCommit), Outcome::Refused(Reason::Model(ModelFault::Damaged)));
     }
 
     proptest! {
         #[test]
-        fn commands_come_through_the_mailbox(sequence in any::<u8>(), numbers in any::<[u32; 2]>(), bytes in prop::collection::vec(any::<u8>(), 0..=CHUNK)) {
+        fn commands_come_through_the_mailbox(
+            sequence in any::<u8>(), numbers in any::<[u32; 2]>(), bytes in prop::collection::vec(any::<u8>(), 0..=CHUNK)
+        ) {
             let commands = [
                 Command::ModelBegin { length: numbers[0], checksum: numbers[1] },
                 Command::ModelChunk(ModelChunk { offset: numbers[0], bytes: &bytes }),

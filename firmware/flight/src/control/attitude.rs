@@ -1,4 +1,7 @@
 //! Attitude loop.
+//!
+//! *in* a thrust vector and a state; *out* collective thrust and moment; *never* a memory of its own; *source* Lee, Leok,
+//! McClamroch 2010.
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,7 @@
 //! Mixer: thrust and moment to rotor speeds.
+//!
+//! *in* collective thrust, N, and moment, N m, body FLU; *out* fractions of the largest rotor speed; *never* one outside of
+//! 0..=1; *source* thrust and reaction torque proportional to the squared rotor speed.
 
 use nalgebra::{Matrix4, Vector3, Vector4};
 

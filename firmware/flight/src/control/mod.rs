@@ -1,7 +1,7 @@
 //! The baseline loop: position and velocity references to a thrust vector, attitude loop, mixer.
 //!
-//! *in* a [`crate::types::Reference`] and a [`crate::types::State`]; *out* a [`crate::types::MotorCommand`]; *never* a non-finite command;
-//! *source* Lee, Leok, McClamroch 2010 (geometric attitude control) as in RotorPy's `SE3Control`; Zhou 2017, section V-A
+//! *in* a [`crate::types::Reference`] and a [`crate::types::State`]; *out* a [`crate::types::MotorCommand`]; *never* a non-finite
+//! command; *source* Lee, Leok, McClamroch 2010 (geometric attitude control) as in RotorPy's `SE3Control`; Zhou 2017, section V-A
 //! (nonlinear transformation and PD). What differs: no acceleration feed-forward, an optional bounded integral.
 
 mod attitude;

@@ -1,4 +1,7 @@
 //! Position loop.
+//!
+//! *in* a reference and a state; *out* a thrust vector, at the reference's rate; *never* an attitude that is undefined: the last
+//! one stays; *source* Zhou 2017, section V-A.
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,7 @@
 //! Lines that lose, damage, reorder and invent bytes.
+//!
+//! *in* the frozen messages; *out* what a receiver makes of damaged lines, judged; *never* a message that was not sent; *source*
+//! proptest's draws.
 
 use proptest::prelude::*;
 
@@ -298,7 +301,9 @@ proptest! {
     }
 
     #[test]
-    fn any_bytes_deliver_nothing_and_cost_no_later_frame(bytes in prop::collection::vec(prop_oneof![any::<u8>(), 0u8..4], 0..600)) {
+    fn any_bytes_deliver_nothing_and_cost_no_later_frame(
+        bytes in prop::collection::vec(prop_oneof![any::<u8>(), 0u8..4], 0..600)
+    ) {
         let mut receiver = Receiver::<Commands>::new();
         prop_assert!(feed(&mut receiver, &bytes).iter().all(Result::is_err));
         feed(&mut receiver, &[0]);
@@ -306,7 +311,9 @@ proptest! {
     }
 
     #[test]
-    fn any_payload_is_a_valid_message_or_refused(mut payload in prop::collection::vec(any::<u8>(), 2..=super::PAYLOAD), kind in 0u8..12) {
+    fn any_payload_is_a_valid_message_or_refused(
+        mut payload in prop::collection::vec(any::<u8>(), 2..=super::PAYLOAD), kind in 0u8..12
+    ) {
         payload[0] = super::VERSION;
         if let Some(place) = payload.get_mut(2) {
             *place = kind;

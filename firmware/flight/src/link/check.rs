@@ -1,7 +1,7 @@
 //! What a decoded message must fulfil to be delivered.
 //!
-//! *in* a message; *out* the reason why it is refused, if it is; *never* a number that is not finite past here, or a change of one
-//! that is; *source* x86 and Arm give NaN other bits, so a NaN would end the equality of both.
+//! *in* a message; *out* the reason why it is refused, if it is; *never* a number that is not finite past here, or a change of
+//! one that is; *source* x86 and Arm give NaN other bits, so a NaN would end the equality of both.
 
 use super::{
     CHUNK,
@@ -122,7 +122,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn attitudes_pass_within_a_thousandth_of_unit_length(direction in prop::array::uniform4(-1.0f32..1.0), scale in 0.9f32..1.1) {
+        fn attitudes_pass_within_a_thousandth_of_unit_length(
+            direction in prop::array::uniform4(-1.0f32..1.0), scale in 0.9f32..1.1
+        ) {
             let length = direction.iter().map(|x| x * x).sum::<f32>().sqrt();
             prop_assume!(length > 0.1 && (math::abs(scale - 1.0) - 1e-3).abs() > 1e-5);
             let attitude = direction.map(|x| x / length * scale);

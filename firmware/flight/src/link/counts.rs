@@ -1,6 +1,6 @@
 //! What goes wrong on the link, by kind.
 //!
-//! *in* faults; *out* counts since the start; *never* a fault that is not counted; *source* ours.
+//! *in* faults; *out* counts since the start; *never* a fault that is not counted.
 
 use core::fmt;
 

@@ -1,4 +1,7 @@
 //! The protocol's bytes, which must not change within a version.
+//!
+//! *in* one value of every message; *out* its payload's bytes; *never* other bytes within a version; *source* the bytes of the
+//! first build of the version.
 
 use super::{
     Command, FRAME, Outcome, Reason, Report, VERSION, encode,
@@ -174,8 +177,8 @@ fn the_bytes_of_this_version_do_not_change() {
     let same = payloads.iter().map(String::as_str).eq(PAYLOADS.split_whitespace()) && lanes == FRAME_OF_LANES && VERSION == 1;
     assert!(
         same,
-        "the bytes of the link changed, so an older peer would misunderstand them: put them right, or raise VERSION and replace the \
-         frozen bytes by these:\n{}\n\n{lanes}",
+        "the bytes of the link changed, so an older peer would misunderstand them: put them right, or raise VERSION and replace \
+         the frozen bytes by these:\n{}\n\n{lanes}",
         payloads.join("\n")
     );
 }

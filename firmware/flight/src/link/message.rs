@@ -1,7 +1,7 @@
 //! What is said over the link.
 //!
-//! *in/out* values of the crate, as the two enums below list them; *never* a message whose meaning rests on an earlier one's arrival,
-//! but for the upload of a model, which says where each piece belongs; *source* ours.
+//! *in/out* values of the crate, as the two enums below list them; *never* a message whose meaning rests on an earlier one's
+//! arrival, but for the upload of a model, which says where each piece belongs.
 
 mod command;
 mod report;

@@ -1,7 +1,7 @@
 //! What becomes of a command.
 //!
-//! *in* a decision of the vehicle; *out* a code of a few bytes, which the host turns into a sentence; *never* a refusal without its
-//! reason; *source* ours.
+//! *in* a decision of the vehicle; *out* a code of a few bytes, which the host turns into a sentence; *never* a refusal without
+//! its reason.
 
 use core::fmt;
 
@@ -13,7 +13,7 @@ use impromptu_firmware::model::Refusal;
 /// What became of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Outcome {
-    /// It was obeyed.
+    /// It was carried out.
     Done,
     /// It changed nothing.
     Refused(Reason),
@@ -35,7 +35,7 @@ pub enum Reason {
     Armed,
     /// Not while disarmed.
     NotArmed,
-    /// The vehicle does not know where it is, or has not heard for too long.
+    /// The vehicle does not know where it is, or what it knows is too old.
     NoState,
     /// The flight stack cannot run with these settings.
     Settings,

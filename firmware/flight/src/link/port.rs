@@ -1,7 +1,7 @@
 //! The link over any byte port.
 //!
-//! *in/out* messages, through the traits of `embedded-io`, which boards and hosts implement; *never* half a frame, unless the port
-//! fails in the middle of it; *source* `embedded-io`.
+//! *in/out* messages, through the traits of `embedded-io`, which boards and hosts implement; *never* half a frame, unless the
+//! port fails in the middle of it; *source* `embedded-io`.
 
 use core::fmt;
 
@@ -11,6 +11,7 @@ use super::{Direction, FRAME, Fault, Message, Received, Receiver, Sender};
 
 /// Why a message is not sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SendError<E> {
     /// It is longer than a payload: a name or a piece of a model is too long.
     Length,
@@ -41,8 +42,8 @@ pub fn send<W: Write>(port: &mut W, sender: &mut Sender, message: &impl Message)
     Ok(sequence)
 }
 
-/// Reads once, gives every message and fault that this completes to `deliver`, and returns the number of bytes read (0: the port is
-/// closed). Waits as the port's `read` does.
+/// Reads once, gives every message and fault that this completes to `deliver`, and returns the number of bytes read (0: the port
+/// is closed). Waits as the port's `read` does.
 ///
 /// # Errors
 /// If the port fails.

@@ -1,7 +1,7 @@
 //! Bytes to messages.
 //!
-//! *in* one byte at a time, from a line that loses, flips and invents them; *out* whole messages and faults, each once; *never* more than
-//! one frame lost to whatever came before it, or a wait; *source* ours, byte stuffing by `cobs`.
+//! *in* one byte at a time, from a line that loses, flips and invents them; *out* whole messages and faults, each once; *never*
+//! more than one frame lost to whatever came before it, or a wait; *source* COBS (Cheshire and Baker 1999), by `cobs`.
 
 use core::marker::PhantomData;
 
@@ -25,8 +25,9 @@ pub enum Order {
     Late,
 }
 
-/// So far behind the youngest a frame is late; 64 ms of a flight at 500 Hz. All other numbers are ahead: after any silence the line is
-/// understood again from the next frame on, or, if what was lost comes within these many of a multiple of 256, that much later.
+/// So far behind the youngest a frame is late; 64 ms of a flight at 500 Hz. All other numbers are ahead: after any silence the
+/// line is understood again from the next frame on, or, if what was lost comes within these many of a multiple of 256, that much
+/// later.
 pub const RECENT: u8 = 32;
 
 /// A message that arrived as it was sent.
@@ -53,7 +54,7 @@ pub struct Receiver<D, const N: usize = BODY> {
 }
 
 impl<D, const N: usize> Receiver<D, N> {
-    /// A receiver that has heard nothing. A line that was listened to in the middle of a frame costs that frame.
+    /// A receiver that has received nothing. A line that was listened to in the middle of a frame costs that frame.
     pub const fn new() -> Self {
         Self {
             body: [0; N],

@@ -1,11 +1,12 @@
 //! Messages to frames.
 //!
-//! *in* a message and a sequence number; *out* the frame's bytes, with the zero that ends it; *never* half a frame: what does not fit
-//! gives none; *source* COBS of Cheshire and Baker 1999 (`cobs`), postcard (`postcard`).
+//! *in* a message and a sequence number; *out* the frame's bytes, with the zero that ends it; *never* half a frame: what does not
+//! fit gives none; *source* COBS of Cheshire and Baker 1999 (`cobs`), postcard (`postcard`).
 
 use super::{BODY, CRC, PAYLOAD, VERSION, message::Message};
 
-/// Encodes a message; `None` if it does not fit into a payload, or the frame into the output ([`super::FRAME`] bytes are enough for any).
+/// Encodes a message; `None` if it does not fit into a payload, or the frame into the output ([`super::FRAME`] bytes are enough
+/// for any).
 pub fn encode<'o>(message: &impl Message, sequence: u8, output: &'o mut [u8]) -> Option<&'o [u8]> {
     let mut body = [0; BODY];
     let (header, rest) = body.split_first_chunk_mut()?;

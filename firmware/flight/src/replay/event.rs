@@ -1,4 +1,6 @@
 //! The calls of the flight stack as records.
+//!
+//! *in* calls; *out* records of a fixed size, and back; *never* a bit that is lost; *source* the table in [`super`].
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 

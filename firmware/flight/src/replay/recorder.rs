@@ -1,4 +1,6 @@
 //! Writes recordings.
+//!
+//! *in* the calls of a flight and its answers; *out* their bytes; *never* a call out of order; *source* the table in [`super`].
 
 use nalgebra::Vector3;
 
@@ -21,8 +23,8 @@ pub struct Recorded<S> {
 
 /// Writes down a flight while it is flown, into anything that takes bytes (a `Vec<u8>`).
 ///
-/// Whoever flies a [`crate::flight::Flight`] tells the recorder of each call: what happens between ticks before it takes effect, and
-/// each tick with the answer.
+/// Whoever flies a [`crate::flight::Flight`] tells the recorder of each call: what happens between ticks before it takes effect,
+/// and each tick with the answer.
 #[derive(Clone, Debug)]
 pub struct Recorder<S> {
     recorded: Recorded<S>,

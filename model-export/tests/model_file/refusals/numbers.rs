@@ -36,13 +36,13 @@ fn numbers() {
             ),
             case!(
                 "lane",
-                |c, b| put(b, c.lane.as_ref().unwrap().axes[0].coefficients, 0, f32::NAN.to_le_bytes()),
+                |c, b| put(b, c.feedback.as_ref().unwrap().axes[0].coefficients, 0, f32::NAN.to_le_bytes()),
                 Refusal::NotFinite { .. },
                 "lane coefficients holds"
             ),
             case!(
                 "margins",
-                |c, _b| c.lane.as_mut().unwrap().margins.gain = f32::NAN,
+                |c, _b| c.feedback.as_mut().unwrap().margins.gain = f32::NAN,
                 Refusal::NotFinite { .. },
                 "lane margins holds"
             ),
@@ -54,19 +54,19 @@ fn numbers() {
             case!("slew", |c, _b| c.outputs[1].slew = 0.0, Refusal::Value { .. }, "output limit or slew"),
             case!(
                 "lane limit",
-                |c, _b| c.lane.as_mut().unwrap().axes[0].fast_limit = -1.0,
+                |c, _b| c.feedback.as_mut().unwrap().axes[0].fast_limit = -1.0,
                 Refusal::Value { .. },
                 "lane integral or limit"
             ),
             case!(
                 "lane integral",
-                |c, _b| c.lane.as_mut().unwrap().axes[0].integral = f32::NAN,
+                |c, _b| c.feedback.as_mut().unwrap().axes[0].integral = f32::NAN,
                 Refusal::Value { .. },
                 "lane integral or limit"
             ),
             case!(
                 "steady state",
-                |c, b| put(b, c.lane.as_ref().unwrap().axes[0].coefficients, 4, 0.9f32.to_le_bytes()),
+                |c, b| put(b, c.feedback.as_ref().unwrap().axes[0].coefficients, 4, 0.9f32.to_le_bytes()),
                 Refusal::Value { .. },
                 "past-output coefficients"
             ),
@@ -90,7 +90,7 @@ fn numbers() {
                 Refusal::Probe { index: 3 },
                 "probe 3 gives other bits"
             ),
-            case!("lane probe", |c, b| nudge(b, c.probes.lane, 0), Refusal::Probe { index: u8::MAX }, "feedback lane's probe"),
+            case!("lane probe", |c, b| nudge(b, c.probes.feedback, 0), Refusal::Probe { index: u8::MAX }, "feedback lane's probe"),
         ],
     );
     check(

@@ -54,7 +54,7 @@ fn shapes_and_sections() {
             case!(
                 "no outputs",
                 |c, _b| {
-                    c.lane = None;
+                    c.feedback = None;
                     c.monitor = None;
                     c.outputs.clear()
                 },
@@ -93,15 +93,15 @@ fn shapes_and_sections() {
             ),
             case!(
                 "promise",
-                |c, _b| c.monitor.as_mut().unwrap().promise = f32::NAN,
-                Refusal::Value { what: "monitor promise" },
-                "monitor promise is out of"
+                |c, _b| c.monitor.as_mut().unwrap().validated_rms = f32::NAN,
+                Refusal::Value { what: "validated RMS of the monitor" },
+                "validated RMS of the monitor is out of"
             ),
-            case!("lags", |c, _b| c.lane.as_mut().unwrap().lags = MAX_LAGS as u8 + 1, Refusal::Shape { .. }, "lane lags is 33"),
-            case!("no lags", |c, _b| c.lane.as_mut().unwrap().lags = 0, Refusal::Shape { .. }, "lane lags is 0"),
+            case!("lags", |c, _b| c.feedback.as_mut().unwrap().lags = MAX_LAGS as u8 + 1, Refusal::Shape { .. }, "lane lags is 33"),
+            case!("no lags", |c, _b| c.feedback.as_mut().unwrap().lags = 0, Refusal::Shape { .. }, "lane lags is 0"),
             case!(
                 "no errors",
-                |c, _b| c.lane.as_mut().unwrap().axes[0].errors.clear(),
+                |c, _b| c.feedback.as_mut().unwrap().axes[0].errors.clear(),
                 Refusal::Shape { .. },
                 "lane errors is 0"
             ),
@@ -119,7 +119,7 @@ fn shapes_and_sections() {
             ),
             case!(
                 "lane length",
-                |c, _b| c.lane.as_mut().unwrap().axes[0].coefficients.length += 4,
+                |c, _b| c.feedback.as_mut().unwrap().axes[0].coefficients.length += 4,
                 Refusal::SectionLength { .. },
                 "section lane coefficients"
             ),

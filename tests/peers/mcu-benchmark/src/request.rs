@@ -5,7 +5,7 @@
 
 use core::hint::black_box;
 
-use impromptu_firmware::model::Place;
+use impromptu_firmware::model::FileBuffer;
 use semihosting::{
     fs::File,
     io::{Read, Write},
@@ -26,7 +26,7 @@ struct Aligned<T: ?Sized>(T);
 include!(concat!(env!("OUT_DIR"), "/images.rs"));
 
 /// The name puts it where memory.x puts weights.
-static IMPROMPTU_WEIGHTS: StaticCell<Place<RAM_WEIGHTS>> = StaticCell::new();
+static IMPROMPTU_WEIGHTS: StaticCell<FileBuffer<RAM_WEIGHTS>> = StaticCell::new();
 
 /// Answers the request in the folder where the emulator was started.
 pub(crate) fn run() -> Result<(), &'static str> {
@@ -37,7 +37,7 @@ pub(crate) fn run() -> Result<(), &'static str> {
     // The compiler shall not evaluate an embedded network in the board's place.
     let flash: &'static [u8] = &black_box(IMAGES).get(word(4) as usize).ok_or("no such image in this binary")?.0;
     let image = if word(8) == 1 {
-        IMPROMPTU_WEIGHTS.init_with(Place::new).hold(flash).ok_or("the weights do not fit into the RAM for weights")?
+        IMPROMPTU_WEIGHTS.init_with(FileBuffer::new).keep(flash).ok_or("the weights do not fit into the RAM for weights")?
     } else {
         flash
     };

@@ -6,7 +6,7 @@
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write};
 use impromptu_board::slots::{SLOT, slots};
-use impromptu_firmware::storage::{Place, Slot};
+use impromptu_firmware::storage::{SlotIndex, Slot};
 use stm32f4xx_hal::{flash::FlashExt as _, pac::FLASH};
 
 /// Offset of the slots from the first byte of the flash.
@@ -15,19 +15,19 @@ const SLOTS: u32 = 0xC_0000;
 /// The spare slot.
 pub(crate) struct Sector {
     flash: FLASH,
-    place: Place,
+    place: SlotIndex,
 }
 
 impl Sector {
-    pub(crate) fn new(flash: FLASH, place: Place) -> Self {
+    pub(crate) fn new(flash: FLASH, place: SlotIndex) -> Self {
         Self { flash, place }
     }
 
     /// Where an offset is in the flash.
     fn locate(&self, offset: u32) -> u32 {
         match self.place {
-            Place::First => SLOTS + offset,
-            Place::Second => SLOTS + SLOT as u32 + offset,
+            SlotIndex::First => SLOTS + offset,
+            SlotIndex::Second => SLOTS + SLOT as u32 + offset,
         }
     }
 
@@ -45,8 +45,8 @@ impl Slot for Sector {
     fn bytes(&self) -> &[u8] {
         let [first, second] = slots();
         match self.place {
-            Place::First => first,
-            Place::Second => second,
+            SlotIndex::First => first,
+            SlotIndex::Second => second,
         }
     }
 }

@@ -5,7 +5,7 @@
 //! - never: a file with half a model. Erasing empties it, the header's write fills it
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
-use impromptu_firmware::storage::{Place, RamFlash, Slot};
+use impromptu_firmware::storage::{SlotIndex, RamFlash, Slot};
 use semihosting::fs;
 use static_cell::ConstStaticCell;
 
@@ -15,20 +15,20 @@ const SLOT: usize = 72 * 1024;
 /// The spare slot.
 pub(crate) struct FileSlot {
     memory: &'static mut RamFlash<SLOT>,
-    place: Place,
+    place: SlotIndex,
 }
 
 impl FileSlot {
     /// Once: the memory is a static.
-    pub(crate) fn new(place: Place) -> Self {
+    pub(crate) fn new(place: SlotIndex) -> Self {
         static IMPROMPTU_WEIGHTS: ConstStaticCell<RamFlash<SLOT>> = ConstStaticCell::new(RamFlash::written());
         Self { memory: IMPROMPTU_WEIGHTS.take(), place }
     }
 
     fn keep(&self, bytes: &[u8]) -> Result<(), NorFlashErrorKind> {
         let name = match self.place {
-            Place::First => c"slot0.bin",
-            Place::Second => c"slot1.bin",
+            SlotIndex::First => c"slot0.bin",
+            SlotIndex::Second => c"slot1.bin",
         };
         fs::write(name, bytes).map_err(|_| NorFlashErrorKind::Other)
     }

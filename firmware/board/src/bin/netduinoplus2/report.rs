@@ -57,7 +57,7 @@ pub(crate) struct ModelReport<'m> {
 impl<'m> From<&Model<'m>> for ModelReport<'m> {
     fn from(model: &Model<'m>) -> Self {
         let network = model.network().map_or(0, |network| network.multiply_adds());
-        let lane = model.lane().map_or(0, |lane| lane.multiply_adds());
+        let lane = model.feedback().map_or(0, |lane| lane.multiply_adds());
         Self { name: model.card().name, checksum: model.checksum(), multiply_adds: network + lane }
     }
 }

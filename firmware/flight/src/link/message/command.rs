@@ -1,7 +1,7 @@
 //! What commands carry.
 //!
-//! *in/out* the crate's values as plain numbers, SI units, world ENU, body FLU; *never* another bit than the sender's: attitudes are not
-//! normalised, so that a flight over the link has the bits of a flight without; *source* ours.
+//! *in/out* the crate's values as plain numbers, SI units, world ENU, body FLU; *never* another bit than the sender's: attitudes
+//! are not normalised, so that a flight over the link has the bits of a flight without.
 
 use nalgebra::{Quaternion, UnitQuaternion};
 use serde::{Deserialize, Serialize};
@@ -121,7 +121,8 @@ mod tests {
             Inertial::new(Tick(1), &state).apply(&mut copy);
             Position::new(Tick(1), &state).apply(&mut copy);
             prop_assert_eq!(copy, state);
-            let setpoint = types::Setpoint { position: vector(14), velocity: vector(17), acceleration: vector(20), yaw: values[23] };
+            let (position, velocity, acceleration) = (vector(14), vector(17), vector(20));
+            let setpoint = types::Setpoint { position, velocity, acceleration, yaw: values[23] };
             prop_assert_eq!(TimedSetpoint::new(-3, &setpoint).setpoint(), setpoint);
         }
     }

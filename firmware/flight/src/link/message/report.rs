@@ -1,6 +1,6 @@
 //! What reports carry.
 //!
-//! *in/out* the crate's values as plain numbers, SI units, world ENU; *never* a name that makes a frame too long; *source* ours.
+//! *in/out* the crate's values as plain numbers, SI units, world ENU; *never* a name that makes a frame too long.
 
 use serde::{Deserialize, Serialize};
 

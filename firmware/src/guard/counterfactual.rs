@@ -1,14 +1,17 @@
-//! The evidence: what the error would be without a lane.
+//! Counterfactual monitor: what the error would be without a lane.
 //!
-//! *in* the loop's errors and what each lane contributed to the correction, at every reference tick; *out* whether a lane does harm; *never* a
-//! number that is not finite; *source* ours. Round calm flight the loop is linear: the error without a lane is e - G u, with the lane's contribution
-//! u and the response G of the measured channel to the correction, which the model stores ([`Monitor`]).
+//! *in* the loop's errors and what each lane contributed to the correction, at every reference tick; *out* whether a lane does
+//! harm; *never* a number that is not finite; *source* a linear model of the loop's response, identified from logs with dither.
 //!
-//! The feedback lane answers for the error with it against that without it. What the network lane asks for does not depend on what is
-//! measured, or hardly, while the feedback lane would also answer to the network's mistakes: so the network is judged on what it would do
-//! alone and in full, against no add-on at all, also while it is faded out: it comes back when it would do good.
+//! Round calm flight the loop is linear: the error without a lane is the error less G u, with the lane's contribution u and the
+//! response G of the measured channel to the correction, which the model stores ([`Monitor`]).
+//!
+//! The feedback lane answers for the error with it against that without it. What the network lane asks for does not depend on
+//! what is measured, or hardly, while the feedback lane would also answer to the network's mistakes: so the network is judged on
+//! what it would do without the feedback lane and in full, against no add-on at all, also while it is faded out: it comes back
+//! when it would do good.
 
-use super::{GuardSettings, Monitor, observation::Shares, watch::leak};
+use super::{GuardSettings, Monitor, observation::Shares, watch::ewma_gain};
 use crate::{
     format::{Floats, MAX_AXES, MAX_INPUTS, MAX_OUTPUTS, MAX_TAPS},
     math::{clamp, finite_or_zero},
@@ -27,7 +30,7 @@ struct Past {
 }
 
 impl Past {
-    const REST: Self = Self { ring: [0.0; MAX_TAPS], sum: 0.0, left: 0 };
+    const EMPTY: Self = Self { ring: [0.0; MAX_TAPS], sum: 0.0, left: 0 };
 
     /// Ends a monitor tick and returns the response to this contribution; `head` is the newest tick's place in the ring.
     fn respond(&mut self, response: Floats<'_>, head: usize, mean: f32) -> f32 {
@@ -63,23 +66,24 @@ pub struct Energies {
     pub with: f32,
     /// Without the feedback lane.
     pub without_feedback: f32,
-    /// With the network lane alone, in full.
-    pub network_alone: f32,
+    /// With the network lane only, in full.
+    pub network_only: f32,
     /// Without any correction.
     pub baseline: f32,
-    /// The same over a longer time.
-    pub usual: f32,
+    /// The same over a longer time: the long-term baseline.
+    pub long_term_baseline: f32,
 }
 
 /// Errors with and without the lanes.
 #[derive(Clone, Debug)]
-pub struct Evidence {
+pub struct Counterfactual {
     /// Reference ticks in the running monitor tick.
     phase: u16,
     /// Place of the next newest in the rings.
     head: usize,
     errors: [f32; MAX_AXES],
-    /// Of each axis and input: the network's part, the feedback's, and what the network alone would add to its part.
+    /// Of each axis and input: the network's part, the feedback's, and what the network would add to its part in full and without
+    /// the other.
     pasts: [[[Past; 3]; MAX_INPUTS]; MAX_AXES],
     energies: Energies,
     harmful: [bool; 2],
@@ -87,14 +91,14 @@ pub struct Evidence {
     busy: bool,
 }
 
-impl Evidence {
+impl Counterfactual {
     /// Nothing seen yet: all zeros.
     pub(super) const NONE: Self = Self {
         phase: 0,
         head: 0,
         errors: [0.0; MAX_AXES],
-        pasts: [[[Past::REST; 3]; MAX_INPUTS]; MAX_AXES],
-        energies: Energies { with: 0.0, without_feedback: 0.0, network_alone: 0.0, baseline: 0.0, usual: 0.0 },
+        pasts: [[[Past::EMPTY; 3]; MAX_INPUTS]; MAX_AXES],
+        energies: Energies { with: 0.0, without_feedback: 0.0, network_only: 0.0, baseline: 0.0, long_term_baseline: 0.0 },
         harmful: [false; 2],
         busy: false,
     };
@@ -116,7 +120,7 @@ impl Evidence {
         }
         // In place: as a whole it would be 3 KB of the control task's stack.
         for past in self.pasts.iter_mut().flatten().flatten() {
-            *past = Past::REST;
+            *past = Past::EMPTY;
         }
         (self.phase, self.head, self.errors) = (0, 0, [0.0; MAX_AXES]);
         (self.energies, self.harmful, self.busy) = (Energies::default(), [false; 2], false);
@@ -141,7 +145,7 @@ impl Evidence {
                 let acted = share(&shares.network, output);
                 network.sum += acted;
                 feedback.sum += share(&shares.feedback, output);
-                more.sum += share(&shares.alone, output) - acted;
+                more.sum += share(&shares.network_only, output) - acted;
             }
         }
         self.phase = self.phase.saturating_add(1);
@@ -174,32 +178,32 @@ impl Evidence {
                 feedback += responses[1];
                 more += responses[2];
             }
-            let alone = with - feedback;
+            let unaided = with - feedback;
             now.with += with * with;
-            now.without_feedback += alone * alone;
-            now.network_alone += (alone + more) * (alone + more);
-            now.baseline += (alone - network) * (alone - network);
+            now.without_feedback += unaided * unaided;
+            now.network_only += (unaided + more) * (unaided + more);
+            now.baseline += (unaided - network) * (unaided - network);
         }
-        let weight = |seconds: f32| leak(ticks / (seconds * rate_hz));
-        let recent = weight(settings.evidence_s);
+        let weight = |seconds: f32| ewma_gain(ticks / (seconds * rate_hz));
+        let recent = weight(settings.counterfactual_s);
         let past = &mut self.energies;
         for (energy, now, weight) in [
             (&mut past.with, now.with, recent),
             (&mut past.without_feedback, now.without_feedback, recent),
-            (&mut past.network_alone, now.network_alone, recent),
+            (&mut past.network_only, now.network_only, recent),
             (&mut past.baseline, now.baseline, recent),
-            (&mut past.usual, now.baseline, weight(settings.usual_s)),
+            (&mut past.long_term_baseline, now.baseline, weight(settings.long_term_s)),
         ] {
             *energy = finite_or_zero(*energy + (now - *energy) * weight);
         }
-        let floor = settings.evidence_floor * monitor.promise();
+        let floor = settings.counterfactual_floor * monitor.validated_rms();
         let worse = |with: f32, without: f32, factor: f32| with > factor * factor * without + floor * floor;
         // What the network does wrong the feedback lane mends, as far as it can be mended.
-        let factor = if assisted { settings.assisted_factor } else { settings.evidence_factor };
-        let baseline = if past.usual > past.baseline { past.usual } else { past.baseline };
-        let share = settings.evidence_share * settings.evidence_share * baseline;
+        let factor = if assisted { settings.assisted_factor } else { settings.counterfactual_factor };
+        let baseline = if past.long_term_baseline > past.baseline { past.long_term_baseline } else { past.baseline };
+        let share = settings.counterfactual_share * settings.counterfactual_share * baseline;
         // While the network acts, what is measured must be worse too.
-        let network = worse(past.network_alone, baseline, factor) && (!acts || worse(past.with, baseline, factor));
-        self.harmful = [network, worse(past.with, past.without_feedback + share, settings.evidence_factor)];
+        let network = worse(past.network_only, baseline, factor) && (!acts || worse(past.with, baseline, factor));
+        self.harmful = [network, worse(past.with, past.without_feedback + share, settings.counterfactual_factor)];
     }
 }
