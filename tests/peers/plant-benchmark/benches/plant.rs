@@ -1,4 +1,5 @@
-//! Time of one Runge-Kutta step of the crate `peng_quad`, to be read beside those of our plant, whose benchmark is `plant` as well.
+//! Time of one Runge-Kutta step of the crate `peng_quad`, to be read beside those of our plant, whose benchmark is called `plant`
+//! as well.
 //!
 //! Criterion's throughput is vehicle-steps a second (Melem/s: million steps a second and core). `peng_quad` computes in f32 a
 //! rigid body under a given thrust and moment: no motors, rotors, wind or saturation.
