@@ -86,7 +86,7 @@ pub struct Flight<'m> {
     adapter: QuadrotorAdapter<'m>,
     wanted: ThrustVector,
     reference: Reference,
-    excitation: Vector3<f32>,
+    dither: Vector3<f32>,
 }
 
 impl<'m> Flight<'m> {
@@ -102,7 +102,7 @@ impl<'m> Flight<'m> {
                 attitude: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
             },
             reference: Reference::ORIGIN,
-            excitation: Vector3::new(0.0, 0.0, 0.0),
+            dither: Vector3::new(0.0, 0.0, 0.0),
         }
     }
 
@@ -135,7 +135,7 @@ impl<'m> Flight<'m> {
         }
         self.preview.restart(quadrotor::END_RULES, 0);
         self.adapter.reset();
-        (self.wanted, self.reference, self.excitation) = (ThrustVector::NONE, Reference::ORIGIN, Vector3::zeros());
+        (self.wanted, self.reference, self.dither) = (ThrustVector::NONE, Reference::ORIGIN, Vector3::zeros());
     }
 
     /// Puts an add-on before the configured loops, with the lanes given, in the place of the one that was there.
@@ -215,8 +215,8 @@ impl<'m> Flight<'m> {
 
     /// Adds an offset, m, world ENU, to the position reference from the next reference tick on: the independent dither without
     /// which the closed loop cannot be identified. Zero leaves every bit as it is.
-    pub fn excite(&mut self, offset: Vector3<f32>) {
-        self.excitation = offset;
+    pub fn set_dither(&mut self, offset: Vector3<f32>) {
+        self.dither = offset;
     }
 
     /// One control tick, the network included.
@@ -269,8 +269,8 @@ impl<'m> Flight<'m> {
         let reference_tick = (tick.0 / loops.position_divisor) as i32;
         let (reference, released) = adapted(&self.preview, adapter, reference_tick, state, job, path);
         self.reference = reference;
-        if self.excitation != Vector3::zeros() {
-            self.reference.position += self.excitation;
+        if self.dither != Vector3::zeros() {
+            self.reference.position += self.dither;
         }
         (Some(loops.position.step(&self.reference, state)), released)
     }

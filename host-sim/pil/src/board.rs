@@ -274,7 +274,7 @@ impl<L: Line> FlightStack for BoardFlight<'_, L> {
         self.next
     }
 
-    fn excite(&mut self, _: Vector3<f32>) {
+    fn set_dither(&mut self, _: Vector3<f32>) {
         // Dithered flights are for identification, which is the host's.
     }
 

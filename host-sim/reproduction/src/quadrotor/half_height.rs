@@ -64,7 +64,7 @@ impl FlightStack for HalfHeight<'_> {
         self.add_on.next_tick()
     }
 
-    fn excite(&mut self, _: Vector3<f32>) {}
+    fn set_dither(&mut self, _: Vector3<f32>) {}
 
     fn step(&mut self, tick: Tick, state: &State) -> MotorCommand {
         if tick.0.is_multiple_of(self.divisor) {
