@@ -11,8 +11,9 @@ pub(crate) mod servo;
 use std::error::Error;
 
 use impromptu_firmware::{
+    AddOn,
     adapter::{Inference, Job, Lanes},
-    add_on::{AddOn, Report},
+    add_on::Report,
     exchange::Mailbox,
     model::{MAX_FEATURES, MAX_OUTPUTS, Model},
     network::{Network, Scratch},

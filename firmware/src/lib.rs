@@ -13,12 +13,12 @@
 //!
 //! # A whole use
 //!
-//! A servo's position loop runs at 500 Hz and lags behind; the model was trained on its logs. [`add_on::AddOn`] comes between the trajectory
+//! A servo's position loop runs at 500 Hz and lags behind; the model was trained on its logs. [`AddOn`] comes between the trajectory
 //! and the loop. In a static, without a model, with the network in another task: see there, and `examples/`.
 //!
 //! ```
+//! use impromptu_firmware::AddOn;
 //! use impromptu_firmware::adapter::Lanes;
-//! use impromptu_firmware::add_on::AddOn;
 //! use impromptu_firmware::model::{Channel, Channels, Model};
 //! use impromptu_firmware::network::Scratch;
 //! use impromptu_firmware::preview::EndRule;
@@ -82,3 +82,5 @@ pub mod region;
 pub mod exchange;
 
 pub mod storage;
+
+pub use add_on::AddOn;

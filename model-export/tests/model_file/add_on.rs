@@ -18,6 +18,13 @@ const CAPACITY: usize = 128;
 const AHEAD: i32 = 60;
 type Cart<'m> = AddOn<'m, 2, 2, 2, CAPACITY>;
 
+/// The report of an add-on that has done nothing.
+fn nothing(next_tick: i32) -> Report {
+    let mut report = Report::default();
+    report.next_tick = next_tick;
+    report
+}
+
 fn bits(values: [f32; 2]) -> [u32; 2] {
     values.map(f32::to_bits)
 }
@@ -49,8 +56,8 @@ proptest! {
             preview.push(sample);
             add_ons.map(|add_on| add_on.push(sample).unwrap());
         };
-        whole.restart(first);
-        split.restart(first);
+        whole.clear(first);
+        split.clear(first);
         adapter.switch(Lanes::BOTH);
         whole.switch(Lanes::BOTH);
         split.switch(Lanes::BOTH);
@@ -87,7 +94,7 @@ fn without_a_model_the_reference_is_the_desired_one() {
     assert_eq!(bits(add_on.step(0, &[f32::NAN, 1.0], &mut Scratch::new())), bits([1.5, -0.0]));
     // The end rules are those of the table: the position holds, the velocity vanishes.
     assert_eq!(add_on.step(1, &[0.0; 2], &mut Scratch::new()), [1.5, 0.0]);
-    assert!(add_on.guard().is_none() && add_on.report() == Report { next_tick: 1, ..Default::default() });
+    assert!(add_on.guard().is_none() && add_on.report() == nothing(1));
     // A table in another order is followed by its names.
     let swapped = [table.reference[1], table.reference[0]];
     let signals = Channels { reference: &swapped, ..Channels::from(&table) };
@@ -126,7 +133,7 @@ fn a_refused_model_and_a_refused_sample_change_nothing() {
 }
 
 #[test]
-fn a_reset_keeps_the_wanted_lanes_and_a_restart_their_fade() {
+fn clearing_keeps_the_fade_a_reset_the_wanted_lanes_and_a_restart_neither() {
     let mut description = description(1);
     description.timing.fade_s = 0.04;
     let bytes = constant_model(description.clone(), [0.25, 0.5]);
@@ -139,8 +146,10 @@ fn a_reset_keeps_the_wanted_lanes_and_a_restart_their_fade() {
         add_on.report().network_weight
     };
     assert_eq!([0, 1, 2, 3].map(|tick| weight(&mut add_on, tick)), [0.25, 0.5, 0.75, 1.0]);
-    add_on.restart(20);
+    add_on.clear(20);
     assert_eq!((weight(&mut add_on, 20), add_on.report().next_tick), (1.0, 21));
     add_on.reset(0);
     assert_eq!((weight(&mut add_on, 0), add_on.report().next_tick), (0.25, 1));
+    add_on.restart(-5);
+    assert_eq!((weight(&mut add_on, -5), add_on.report()), (0.0, nothing(-4)));
 }
