@@ -3,8 +3,8 @@
 //! *in* and *out* those of the firmware's flight stack, which flies inside; *never* another loop than the firmware's; *source* Zhou 2017, Fig. 4.
 
 use impromptu_firmware::{
+    AddOn,
     adapter::Lanes,
-    add_on::AddOn,
     guard::{GuardSettings, Trips},
     model::{Model, Refusal},
     network::Scratch,
