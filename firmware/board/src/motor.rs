@@ -6,7 +6,7 @@
 //!
 //! A battery that is not full turns the rotors slower: who flies fast compensates the voltage.
 
-use crate::CRAZYFLIE;
+use crate::vehicle::CRAZYFLIE;
 
 /// Revolutions a minute for a step of the duty cycle in 16 bits.
 const SCALE: f32 = 0.2685;

@@ -8,7 +8,7 @@ use impromptu_firmware::{
 use impromptu_flight::{application::Application, flight::Flight};
 use static_cell::ConstStaticCell;
 
-use crate::CRAZYFLIE;
+use crate::vehicle::CRAZYFLIE;
 
 /// A board that is ready.
 pub struct Start {
