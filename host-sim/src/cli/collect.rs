@@ -102,7 +102,7 @@ impl Collect {
                 let kind = name(flight_set.signal);
                 let dithered = if dither.is_some() { "-dithered" } else { "" };
                 let file = folder.join(format!("{index}-{kind}{dithered}-{flight:04}.csv"));
-                write_log(&log, &file)?;
+                write_log(log, &file)?;
                 logs.push(entry(log, file.display().to_string()));
             }
             first = first.wrapping_add(u64::from(flight_set.flights));
