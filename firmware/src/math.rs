@@ -69,13 +69,6 @@ pub fn clamp(x: f32, low: f32, high: f32) -> f32 {
     }
 }
 
-/// Nearest integer, halves away from zero, saturated to ±`limit`; NaN gives 0.
-#[inline(always)]
-pub fn round_to_i32(x: f32, limit: i32) -> i32 {
-    let rounded = (if x < 0.0 { x - 0.5 } else { x + 0.5 }) as i32;
-    rounded.clamp(-limit, limit)
-}
-
 /// `x` if it is finite, else 0: what an edge does with a value that cannot be trusted.
 #[inline(always)]
 pub fn finite_or_zero(x: f32) -> f32 {
@@ -109,13 +102,5 @@ mod tests {
             assert!(sine.abs() <= 1.0 && cosine.abs() <= 1.0 || angle.is_nan(), "{angle}: {sine} {cosine}");
         }
         assert_eq!(sin_cos(0.0), (0.0, 1.0));
-    }
-
-    #[test]
-    fn rounding_is_symmetric_and_saturates() {
-        assert_eq!(round_to_i32(2.5, 100), 3);
-        assert_eq!(round_to_i32(-2.5, 100), -3);
-        assert_eq!(round_to_i32(1e30, 32_767), 32_767);
-        assert_eq!(round_to_i32(f32::NAN, 32_767), 0);
     }
 }
