@@ -3,7 +3,7 @@
 use impromptu_firmware::{
     model::{Model, Refusal},
     network::{Network, Scratch},
-    storage::{SlotIndex, Sequence, Survey, survey},
+    storage::{Sequence, SlotIndex, Survey, survey},
 };
 use impromptu_flight::{application::Application, flight::Flight};
 use static_cell::ConstStaticCell;
