@@ -1,6 +1,6 @@
 //! Flights by the firmware beside the same flights by the software.
 //!
-//! *in* plans; *out* the records of both and what the microcontroller measured; *never* a comparison of anything but bits; *source* ours.
+//! *in* plans; *out* the records of both and what the microcontroller measured; *never* a comparison of anything but bits.
 
 use impromptu_firmware::model::Model;
 use impromptu_sim::{

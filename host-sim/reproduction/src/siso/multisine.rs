@@ -1,6 +1,6 @@
 //! Sums of sines at random frequencies: signals to train on, and others of the same kind to test with.
 //!
-//! *in* a band, a number of tones, a seed; *out* a signal; *never* a tone outside of the band; *source* ours.
+//! *in* a band, a number of tones, a seed; *out* a signal; *never* a tone outside of the band.
 
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
