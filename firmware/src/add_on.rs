@@ -8,7 +8,7 @@
 //!
 //! ```
 //! use impromptu_firmware::{
-//!     add_on::AddOn,
+//!     AddOn,
 //!     model::{Channel, Channels},
 //!     preview::EndRule,
 //! };
@@ -183,15 +183,22 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
 
     /// Forgets the trajectory, for another one: the next sample will be that of `first_tick`. All else stays, also what was measured: for
     /// a jump of the trajectory on the way.
-    pub fn restart(&mut self, first_tick: i32) {
+    pub fn clear(&mut self, first_tick: i32) {
         self.preview.clear(first_tick);
     }
 
-    /// Forgets the trajectory and everything that was measured and corrected, but for the lanes that are wanted, which fade in again, and
-    /// the counts: for a loop that was at rest. The next sample will be that of `first_tick`.
+    /// Forgets the trajectory and everything that was measured and corrected, but for the counts and the lanes that are wanted, which fade
+    /// in again: for a loop that was at rest. The next sample will be that of `first_tick`.
     pub fn reset(&mut self, first_tick: i32) {
         self.preview.clear(first_tick);
         self.adapter.reset();
+    }
+
+    /// Forgets everything but the model, the signals and the guard's settings: as when the model came, with both lanes off. The next sample
+    /// will be that of `first_tick`.
+    pub fn restart(&mut self, first_tick: i32) {
+        self.preview.clear(first_tick);
+        self.adapter.restart();
     }
 
     /// Switches lanes; they fade in and out over the model's fade time. Both off and faded out: the reference is the desired one, to
@@ -256,14 +263,9 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
         self.adapter.set_age(ticks);
     }
 
-    /// The adapter.
-    pub fn adapter(&self) -> &Adapter<'m, D, M, R> {
-        &self.adapter
-    }
-
-    /// The adapter, for whoever does more with it than a whole add-on does.
-    pub fn adapter_mut(&mut self) -> &mut Adapter<'m, D, M, R> {
-        &mut self.adapter
+    /// Adapter and trajectory, for whoever does more with them than a whole add-on does.
+    pub fn parts(&mut self) -> (&mut Adapter<'m, D, M, R>, &mut Preview<D, N>) {
+        (&mut self.adapter, &mut self.preview)
     }
 }
 

@@ -3,7 +3,7 @@
 //! *in* desired and measured channels, counted; *out* reference channels; *never* other bits than those of an add-on whose arrays have just these
 //! channels; *source* [`impromptu_firmware::add_on`].
 
-use impromptu_firmware::add_on::{AddOn, NotFinite};
+use impromptu_firmware::{AddOn, add_on::NotFinite};
 
 use crate::{
     status::Status,

@@ -16,7 +16,7 @@ use impromptu_model_export::{
 use impromptu_sim::{flight_log::FlightLog, flights::Loop};
 use impromptu_training::{
     AxisGates, Candidates, Judge, Learned, Purpose, Recipe, Rows, best_in_flight, check_gates, derived, describe, learn, monitor,
-    observer::Observer as _, promise, smoothing, supervised::Progress, validation_strokes, write_model_files,
+    observer::Observer as _, smoothing, supervised::Progress, validated_rms, validation_strokes, write_model_files,
 };
 use serde::Serialize;
 
@@ -24,7 +24,7 @@ use super::{
     Invocation,
     configuration::checked,
     output::table,
-    situation::{milliseconds, plant},
+    situation::{closed_loop, milliseconds},
 };
 
 /// Arguments of `train`.
@@ -96,7 +96,7 @@ struct Passed {
 /// The logs' loop: what of it is known.
 struct Origin {
     /// The simulated loop of the validation flights.
-    plant: Option<Loop>,
+    closed_loop: Option<Loop>,
     /// The loop whose signals and rates the model has.
     template: Loop,
     delay_s: f64,
@@ -121,15 +121,15 @@ impl Train {
         let folder = invocation.configuration.folder()?;
 
         invocation.console.stage(&format!("training on {} logs", logs.len()));
-        let validation = match &origin.plant {
-            Some(plant) => validation_strokes(&recipe, &recipe.validation_speeds, plant.rate_hz(), seed)?,
+        let validation = match &origin.closed_loop {
+            Some(closed_loop) => validation_strokes(&recipe, &recipe.validation_speeds, closed_loop.rate_hz(), seed)?,
             None => Vec::new(),
         };
-        let in_flight = origin.plant.as_ref().map(|plant| {
+        let in_flight = origin.closed_loop.as_ref().map(|closed_loop| {
             let flight_seed = derived(seed, Purpose::Validation);
             let (recipe, validation) = (&recipe, &validation);
             move |candidates: Candidates<'_>, rows: &Rows| {
-                Ok(best_in_flight(recipe, plant, validation, flight_seed, candidates, rows)?)
+                Ok(best_in_flight(recipe, closed_loop, validation, flight_seed, candidates, rows)?)
             }
         });
         let judge = in_flight.as_ref().map(|judge| judge as &Judge<'_>);
@@ -144,7 +144,7 @@ impl Train {
         };
         invocation.console.stage("designing the feedback lane");
         let identification = if dithered.is_empty() { &logs } else { &dithered };
-        let lane = feedback::choose(invocation, &recipe, origin.plant.as_ref(), identification, &validation, &|lane| {
+        let lane = feedback::choose(invocation, &recipe, origin.closed_loop.as_ref(), identification, &validation, &|lane| {
             encode(&describe(Some(lane), ""), Some(&learned.quantised), Precision::Int8, &learned.rows.calibration)
         });
         let (mut remarks, design, refusal) = match &lane {
@@ -160,8 +160,8 @@ impl Train {
             |description: &Description| encode(description, Some(&learned.quantised), Precision::Int8, &learned.rows.calibration);
         let mut model = exported(&description)?;
         // What the guard judges by needs flights that the add-on flew; without a vehicle there are none.
-        if let (Some(plant), Ok(mut monitor)) = (&origin.plant, monitor(&recipe, identification)) {
-            monitor.validated_rms = promise(plant, &validation, &model, derived(seed, Purpose::Validation))?;
+        if let (Some(closed_loop), Ok(mut monitor)) = (&origin.closed_loop, monitor(&recipe, identification)) {
+            monitor.validated_rms = validated_rms(closed_loop, &validation, &model, derived(seed, Purpose::Validation))?;
             description.monitor = Some(monitor);
             model = exported(&description)?;
         }
@@ -199,22 +199,22 @@ impl Train {
     }
 
     fn origin(&self, recipe: &Recipe) -> Result<Origin> {
-        let known = self.vehicle.as_ref().map(|vehicle| plant(vehicle, &self.gains, &self.condition)).transpose()?;
+        let known = self.vehicle.as_ref().map(|vehicle| closed_loop(vehicle, &self.gains, &self.condition)).transpose()?;
         let delay_s = match (self.delay_ms, &known) {
             (Some(delay), _) => delay / 1e3,
-            (None, Some(plant)) => plant.condition.measurement_delay_s,
+            (None, Some(closed_loop)) => closed_loop.condition.measurement_delay_s,
             (None, None) => 0.024,
         };
         let smoothing_s = match (self.smoothing_ms, &known) {
             (Some(smoothing), _) => smoothing / 1e3,
-            (None, Some(plant)) => smoothing(recipe, plant),
+            (None, Some(closed_loop)) => smoothing(recipe, closed_loop),
             (None, None) => recipe.smoothing_s,
         };
         let template = match &known {
-            Some(plant) => plant.clone(),
-            None => plant("crazyflie", "stock", "lab")?,
+            Some(closed_loop) => closed_loop.clone(),
+            None => closed_loop("crazyflie", "stock", "lab")?,
         };
-        Ok(Origin { plant: known, template, delay_s, smoothing_s })
+        Ok(Origin { closed_loop: known, template, delay_s, smoothing_s })
     }
 }
 
@@ -256,7 +256,7 @@ fn describe_model(
     seed: u64,
 ) -> Description {
     let description = describe(recipe, &origin.template, &learned.rows, lane, name, remarks, seed);
-    let provenance = match &origin.plant {
+    let provenance = match &origin.closed_loop {
         Some(_) => description.provenance,
         None => {
             let unknown = || "not stated".to_owned();

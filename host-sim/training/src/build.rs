@@ -17,7 +17,7 @@ use crate::{
     lane::{LaneChoice, LaneRefusal, choose_lane, dithered_logs, strongest_lane},
     learn::{Candidates, Learned, Rows, learn},
     models::{FromFlights, ModelSet, describe, feedforward},
-    monitor::{monitor, promise},
+    monitor::{monitor, validated_rms},
     recipe::{LaneRecipe, Recipe},
     supervised::Progress,
 };
@@ -60,12 +60,12 @@ pub fn derived(seed: u64, purpose: Purpose) -> u64 {
 ///
 /// # Errors
 /// If they cannot be flown.
-pub fn training_logs(recipe: &Recipe, plant: &Loop, seed: u64) -> Result<Vec<FlightLog>, FlightsError> {
+pub fn training_logs(recipe: &Recipe, closed_loop: &Loop, seed: u64) -> Result<Vec<FlightLog>, FlightsError> {
     let mut first = derived(seed, Purpose::Training);
     let mut logs = Vec::new();
-    for excitation in &recipe.excitations {
-        logs.extend(plant.collect(&excitation.motions(first), None, first)?);
-        first = first.wrapping_add(u64::from(excitation.flights));
+    for flight_set in &recipe.training_flights {
+        logs.extend(closed_loop.collect(&flight_set.motions(first), None, first)?);
+        first = first.wrapping_add(u64::from(flight_set.flights));
     }
     Ok(logs)
 }
@@ -84,38 +84,43 @@ pub fn validation_strokes(recipe: &Recipe, speeds: &[f64], rate_hz: f64, seed: u
 }
 
 /// Smoothing of logs under a condition: none where there is no noise.
-pub fn smoothing(recipe: &Recipe, plant: &Loop) -> f64 {
-    if plant.condition.noise.position > 0.0 || plant.condition.noise.velocity > 0.0 { recipe.smoothing_s } else { 0.0 }
+pub fn smoothing(recipe: &Recipe, closed_loop: &Loop) -> f64 {
+    if closed_loop.condition.noise.position > 0.0 || closed_loop.condition.noise.velocity > 0.0 {
+        recipe.smoothing_s
+    } else {
+        0.0
+    }
 }
 
 /// Builds the models of a loop. The same seed gives the same bytes.
 ///
 /// # Errors
 /// If flights or learning fail; a refused feedback lane is no error.
-pub fn build(recipe: &Recipe, plant: &Loop, seed: u64, progress: &mut dyn FnMut(Progress)) -> Result<Built, BuildError> {
-    let delay = plant.condition.measurement_delay_s;
+pub fn build(recipe: &Recipe, closed_loop: &Loop, seed: u64, progress: &mut dyn FnMut(Progress)) -> Result<Built, BuildError> {
+    let delay = closed_loop.condition.measurement_delay_s;
     let mut recipe = recipe.clone();
     recipe.network.seed = seed;
     recipe.fine_tuning.seed = seed;
-    let logs = training_logs(&recipe, plant, seed)?;
-    let validation = validation_strokes(&recipe, &recipe.validation_speeds, plant.rate_hz(), seed)?;
+    let logs = training_logs(&recipe, closed_loop, seed)?;
+    let validation = validation_strokes(&recipe, &recipe.validation_speeds, closed_loop.rate_hz(), seed)?;
     let flight_seed = derived(seed, Purpose::Validation);
-    let judge =
-        |candidates: Candidates<'_>, rows: &Rows| Ok(best_in_flight(&recipe, plant, &validation, flight_seed, candidates, rows)?);
-    let learned = learn(&recipe, &logs, delay, smoothing(&recipe, plant), Some(&judge), progress)?;
+    let judge = |candidates: Candidates<'_>, rows: &Rows| {
+        Ok(best_in_flight(&recipe, closed_loop, &validation, flight_seed, candidates, rows)?)
+    };
+    let learned = learn(&recipe, &logs, delay, smoothing(&recipe, closed_loop), Some(&judge), progress)?;
     drop(logs);
 
-    let dithered = dithered_logs(&recipe.lane, plant, derived(seed, Purpose::Identification))?;
-    let describe = |lane: Option<&LaneDescription>| describe(&recipe, plant, &learned.rows, lane, "candidate", "", seed);
-    let lane = choose_lane(&recipe, plant, &dithered, &validation, flight_seed, &|lane| {
+    let dithered = dithered_logs(&recipe.lane, closed_loop, derived(seed, Purpose::Identification))?;
+    let describe = |lane: Option<&LaneDescription>| describe(&recipe, closed_loop, &learned.rows, lane, "candidate", "", seed);
+    let lane = choose_lane(&recipe, closed_loop, &dithered, &validation, flight_seed, &|lane| {
         encode(&describe(Some(lane)), Some(&learned.quantised), Precision::Int8, &learned.rows.calibration)
     });
 
     // The feed-forward leaves larger errors, for which the network's lane would be unfairly weak.
     let wide = LaneRecipe { fast_limits: vec![0.1, 0.3], authority_scales: vec![1e3], error_scale: 0.2, ..recipe.lane.clone() };
-    let nominal = validation_strokes(&recipe, &[1.0], plant.rate_hz(), seed)?;
-    let feedforward_lane = strongest_lane(&wide, plant, &dithered, &nominal, flight_seed, &|lane| {
-        feedforward(&plant.settings, describe(Some(lane)))
+    let nominal = validation_strokes(&recipe, &[1.0], closed_loop.rate_hz(), seed)?;
+    let feedforward_lane = strongest_lane(&wide, closed_loop, &dithered, &nominal, flight_seed, &|lane| {
+        feedforward(&closed_loop.settings, describe(Some(lane)))
     })
     .ok();
 
@@ -128,7 +133,7 @@ pub fn build(recipe: &Recipe, plant: &Loop, seed: u64, progress: &mut dyn FnMut(
         let promised = |monitor: &MonitorDescription| {
             let model = encode(describe(lane))?;
             Ok::<_, BuildError>(MonitorDescription {
-                validated_rms: promise(plant, validation, &model, flight_seed)?,
+                validated_rms: validated_rms(closed_loop, validation, &model, flight_seed)?,
                 ..monitor.clone()
             })
         };
@@ -138,9 +143,9 @@ pub fn build(recipe: &Recipe, plant: &Loop, seed: u64, progress: &mut dyn FnMut(
         encode(&description, Some(&learned.quantised), Precision::Int8, &learned.rows.calibration)
     })?;
     let of_feedforward = from_flights(feedforward_lane.as_ref().map(|choice| &choice.lane), &nominal, &|description| {
-        feedforward(&plant.settings, description)
+        feedforward(&closed_loop.settings, description)
     })?;
-    let models = ModelSet::new(&recipe, plant, &learned, &own, &of_feedforward, &remarks, seed)?;
+    let models = ModelSet::new(&recipe, closed_loop, &learned, &own, &of_feedforward, &remarks, seed)?;
     Ok(Built { learned, lane, feedforward_lane, models })
 }
 
@@ -159,33 +164,35 @@ const LOSS_AGAINST_RIDGE: f64 = 0.1;
 /// If a candidate cannot be encoded or flown.
 pub fn best_in_flight(
     recipe: &Recipe,
-    plant: &Loop,
+    closed_loop: &Loop,
     validation: &[Trajectory],
     seed: u64,
     candidates: Candidates<'_>,
     rows: &Rows,
 ) -> Result<usize, BuildError> {
     let lanes = Lanes { network: true, feedback: false };
-    let plant = &plant.unguarded();
-    let late = plant.delayed(LATE_S);
-    let kinds: Vec<(&Loop, &[Trajectory])> = [plant, &late]
+    let closed_loop = &closed_loop.unguarded();
+    let late = closed_loop.delayed(LATE_S);
+    let kinds: Vec<(&Loop, &[Trajectory])> = [closed_loop, &late]
         .into_iter()
-        .flat_map(|plant| validation.chunks(recipe.validation_strokes.max(1)).map(move |trajectories| (plant, trajectories)))
+        .flat_map(|closed_loop| {
+            validation.chunks(recipe.validation_strokes.max(1)).map(move |trajectories| (closed_loop, trajectories))
+        })
         .collect();
     let baselines: Vec<Vec<f64>> = kinds
         .iter()
-        .map(|(plant, trajectories)| plant.errors(trajectories, None, 1.0, seed))
+        .map(|(closed_loop, trajectories)| closed_loop.errors(trajectories, None, 1.0, seed))
         .collect::<Result<_, _>>()
         .map_err(FlightsError::from)?;
     let fly = |network: &FloatNetwork, precision| -> Result<Vec<f64>, BuildError> {
-        let description = describe(recipe, plant, rows, None, "candidate", "", seed);
+        let description = describe(recipe, closed_loop, rows, None, "candidate", "", seed);
         let bytes = encode(&description, Some(network), precision, &rows.calibration)?;
         let model = Model::from_bytes(&bytes).map_err(ExportError::Refused)?;
         kinds
             .iter()
             .zip(&baselines)
-            .map(|((plant, trajectories), baseline)| {
-                let errors = plant.errors(trajectories, Some((&model, lanes)), 1.0, seed).map_err(FlightsError::from)?;
+            .map(|((closed_loop, trajectories), baseline)| {
+                let errors = closed_loop.errors(trajectories, Some((&model, lanes)), 1.0, seed).map_err(FlightsError::from)?;
                 Ok(reduction(baseline, &errors).0)
             })
             .collect()

@@ -140,10 +140,10 @@ pub(crate) fn identification(logs: &[FlightLog], lags: usize) -> Result<[Identif
 fn candidates(recipe: &LaneRecipe, logs: &[FlightLog]) -> Result<Vec<Candidate>, LaneRefusal> {
     let data = identification(logs, recipe.design.margin_lags)?;
     let mut grid = Vec::new();
-    for &effort in &recipe.efforts {
+    for &control_weight in &recipe.control_weights {
         for &velocity_weight in &recipe.velocity_weights {
             for &noise_factor in &recipe.noise_factors {
-                grid.push(DesignSettings { effort, velocity_weight, noise_factor, ..recipe.design.clone() });
+                grid.push(DesignSettings { control_weight, velocity_weight, noise_factor, ..recipe.design.clone() });
             }
         }
     }
@@ -170,8 +170,8 @@ fn candidates(recipe: &LaneRecipe, logs: &[FlightLog]) -> Result<Vec<Candidate>,
             candidates.push(Candidate {
                 lane: describe(&[&horizontal, &horizontal, &vertical], fast_limit, scale, recipe),
                 design: format!(
-                    "effort {}, e_v {}, noise x{}, fast clamp {} m (half of it at {} m/s²)",
-                    settings.effort, settings.velocity_weight, settings.noise_factor, fast_limit, scale
+                    "control weight {}, e_v {}, noise x{}, fast clamp {} m (half of it at {} m/s²)",
+                    settings.control_weight, settings.velocity_weight, settings.noise_factor, fast_limit, scale
                 ),
             });
         }
@@ -239,9 +239,9 @@ fn worst_margins(designs: &[&LaneDesign; 3]) -> Margins {
 ///
 /// # Errors
 /// If they cannot be flown.
-pub fn dithered_logs(recipe: &LaneRecipe, plant: &Loop, seed: u64) -> Result<Vec<FlightLog>, FlightsError> {
+pub fn dithered_logs(recipe: &LaneRecipe, closed_loop: &Loop, seed: u64) -> Result<Vec<FlightLog>, FlightsError> {
     let dither = Dither { amplitude: recipe.dither, hold_s: recipe.dither_hold_s };
-    plant.collect(&recipe.excitation.motions(seed), Some(dither), seed)
+    closed_loop.collect(&recipe.dithered_flights.motions(seed), Some(dither), seed)
 }
 
 /// How one design flew.
@@ -257,7 +257,7 @@ struct Score {
 /// All designs of a recipe from dithered logs, and how each flew over the validation trajectories in every case.
 fn flown(
     recipe: &LaneRecipe,
-    plant: &Loop,
+    closed_loop: &Loop,
     logs: &[FlightLog],
     validation: &[Trajectory],
     seed: u64,
@@ -266,16 +266,19 @@ fn flown(
     let candidates = candidates(recipe, logs)?;
     let cases = &CASES;
     // What a lane does by itself is judged, not what the guard makes of it.
-    let plant = &plant.unguarded();
-    let loops: Vec<Loop> = cases.iter().map(|case| plant.delayed(case.delay_s)).collect();
+    let closed_loop = &closed_loop.unguarded();
+    let loops: Vec<Loop> = cases.iter().map(|case| closed_loop.delayed(case.delay_s)).collect();
     let baselines: Vec<Vec<f64>> =
-        loops.iter().map(|plant| plant.errors(validation, None, 1.0, seed)).collect::<Result<_, _>>()?;
+        loops.iter().map(|closed_loop| closed_loop.errors(validation, None, 1.0, seed)).collect::<Result<_, _>>()?;
     let network_alone: Vec<Vec<f64>> = match candidates.first() {
         Some(candidate) => {
             let bytes = encode(&candidate.lane)?;
             let model = Model::from_bytes(&bytes).map_err(ExportError::Refused)?;
             let lanes = Lanes { network: true, feedback: false };
-            loops.iter().map(|plant| plant.errors(validation, Some((&model, lanes)), 1.0, seed)).collect::<Result<_, _>>()?
+            loops
+                .iter()
+                .map(|closed_loop| closed_loop.errors(validation, Some((&model, lanes)), 1.0, seed))
+                .collect::<Result<_, _>>()?
         }
         None => Vec::new(),
     };
@@ -285,10 +288,10 @@ fn flown(
             let bytes = encode(&candidate.lane)?;
             let model = Model::from_bytes(&bytes).map_err(ExportError::Refused)?;
             let mut score = Score { mean: 0.0, worst: f64::INFINITY, worst_case: "", over_network: f64::INFINITY };
-            for (place, (((case, plant), baseline), alone)) in
+            for (place, (((case, closed_loop), baseline), alone)) in
                 cases.iter().zip(&loops).zip(&baselines).zip(&network_alone).enumerate()
             {
-                let errors = plant.errors(validation, Some((&model, Lanes::BOTH)), case.loop_gain, seed)?;
+                let errors = closed_loop.errors(validation, Some((&model, Lanes::BOTH)), case.loop_gain, seed)?;
                 let worst = worst_to_answer_for(baseline, alone, &errors);
                 // The geometric mean: halving a small error counts as much as halving a large one.
                 let logs = baseline.iter().zip(&errors).map(|(baseline, error)| (error / baseline).ln());
@@ -328,13 +331,13 @@ const LOSS_SHARE: f64 = 0.2;
 /// With the reason why there is no lane.
 pub fn choose_lane(
     recipe: &Recipe,
-    plant: &Loop,
+    closed_loop: &Loop,
     logs: &[FlightLog],
     validation: &[Trajectory],
     seed: u64,
     encode: &(dyn Fn(&LaneDescription) -> Result<Vec<u8>, ExportError> + Sync),
 ) -> Result<LaneChoice, LaneRefusal> {
-    let (candidates, scores) = flown(&recipe.lane, plant, logs, validation, seed, encode)?;
+    let (candidates, scores) = flown(&recipe.lane, closed_loop, logs, validation, seed, encode)?;
     let admissible = |score: &Score| score.worst >= 0.0;
     if let Some(choice) = best(&candidates, &scores, &admissible) {
         return Ok(choice);
@@ -353,13 +356,13 @@ pub fn choose_lane(
 /// If there is no design at all.
 pub fn strongest_lane(
     recipe: &LaneRecipe,
-    plant: &Loop,
+    closed_loop: &Loop,
     logs: &[FlightLog],
     validation: &[Trajectory],
     seed: u64,
     encode: &(dyn Fn(&LaneDescription) -> Result<Vec<u8>, ExportError> + Sync),
 ) -> Result<LaneChoice, LaneRefusal> {
-    let (candidates, scores) = flown(recipe, plant, logs, validation, seed, encode)?;
+    let (candidates, scores) = flown(recipe, closed_loop, logs, validation, seed, encode)?;
     best(&candidates, &scores, &|_| true).ok_or(LaneRefusal::Flights {
         designs: 0,
         worst: f64::NEG_INFINITY,

@@ -47,6 +47,6 @@ pub use gates::{AxisGates, check_gates};
 pub use lane::{LaneChoice, LaneRefusal, choose_lane, dithered_logs, lanes, strongest_lane};
 pub use learn::{Candidates, Judge, LearnError, Learned, Rows, learn};
 pub use models::{FromFlights, ModelSet, describe, feedforward};
-pub use monitor::{monitor, promise};
+pub use monitor::{monitor, validated_rms};
 pub use observer::Observer;
-pub use recipe::{Excitation, LaneRecipe, Recipe, Signal};
+pub use recipe::{FlightSet, LaneRecipe, Recipe, Signal};

@@ -56,7 +56,7 @@ impl ModelSet {
     /// If a model cannot be encoded.
     pub fn new(
         recipe: &Recipe,
-        plant: &Loop,
+        closed_loop: &Loop,
         learned: &Learned,
         own: &FromFlights,
         of_feedforward: &FromFlights,
@@ -64,10 +64,10 @@ impl ModelSet {
         seed: u64,
     ) -> Result<Self, ExportError> {
         let describe = |name: &str, from: &FromFlights| {
-            let description = describe(recipe, plant, &learned.rows, from.lane.as_ref(), name, remarks, seed);
+            let description = describe(recipe, closed_loop, &learned.rows, from.lane.as_ref(), name, remarks, seed);
             Description { monitor: from.monitor.clone(), ..description }
         };
-        let feedforward = feedforward(&plant.settings, describe("feedforward", of_feedforward))?;
+        let feedforward = feedforward(&closed_loop.settings, describe("feedforward", of_feedforward))?;
         let make = |name: &str, network: &FloatNetwork, precision| {
             encode(&describe(name, own), Some(network), precision, &learned.rows.calibration)
         };
@@ -96,7 +96,7 @@ fn outputs(rows: &Rows, lane: Option<&LaneDescription>) -> Vec<Output> {
 /// Description of a model of a loop, without a monitor.
 pub fn describe(
     recipe: &Recipe,
-    plant: &Loop,
+    closed_loop: &Loop,
     rows: &Rows,
     lane: Option<&LaneDescription>,
     name: &str,
@@ -104,11 +104,11 @@ pub fn describe(
     seed: u64,
 ) -> Description {
     Description {
-        name: format!("{}-{}-{}-{name}", plant.vehicle.name, plant.gains, plant.condition.name),
+        name: format!("{}-{}-{}-{name}", closed_loop.vehicle.name, closed_loop.gains, closed_loop.condition.name),
         provenance: Provenance {
-            vehicle: plant.vehicle.name.clone(),
-            gains: plant.gains.clone(),
-            condition: plant.condition.name.clone(),
+            vehicle: closed_loop.vehicle.name.clone(),
+            gains: closed_loop.gains.clone(),
+            condition: closed_loop.condition.name.clone(),
             software: format!("host-sim {}", env!("CARGO_PKG_VERSION")),
             seed,
             data_crc: rows.data_crc,
@@ -116,10 +116,10 @@ pub fn describe(
         },
         signals: Signals::from(&quadrotor::signals()),
         timing: Timing {
-            reference_rate_hz: plant.rate_hz() as f32,
+            reference_rate_hz: closed_loop.rate_hz() as f32,
             divisor: recipe.divisor,
             interpolation: recipe.interpolation,
-            measurement_delay_s: plant.condition.measurement_delay_s as f32,
+            measurement_delay_s: closed_loop.condition.measurement_delay_s as f32,
             fade_s: recipe.fade_s as f32,
         },
         features: recipe.features(),

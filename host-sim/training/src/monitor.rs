@@ -1,6 +1,6 @@
 //! What the firmware's guard is told of a loop: its response to corrections, and what the add-on promises.
 //!
-//! *in* logs with dither, and validation flights with the add-on; *out* a [`MonitorDescription`]; *never* a promise from flights that the
+//! *in* logs with dither, and validation flights with the add-on; *out* a [`MonitorDescription`]; *never* a validated_rms from flights that the
 //! guard has interfered with.
 
 use impromptu_firmware::{adapter::Lanes, model::Model};
@@ -26,7 +26,7 @@ const DIVISOR: usize = 5;
 /// Monitor ticks that a response lasts: 1.6 s, after which the loops of both vehicles are at rest.
 const TAPS: usize = 32;
 
-/// The responses of x, y and z to the corrections of position and velocity, from logs with dither. The promise is still zero.
+/// The responses of x, y and z to the corrections of position and velocity, from logs with dither. The validated_rms is still zero.
 ///
 /// # Errors
 /// If the logs cannot tell what a correction does.
@@ -56,9 +56,9 @@ pub fn monitor(recipe: &Recipe, logs: &[FlightLog]) -> Result<MonitorDescription
 ///
 /// # Errors
 /// If the model is refused or does not fit the flight stack.
-pub fn promise(plant: &Loop, validation: &[Trajectory], model: &[u8], seed: u64) -> Result<f32, BuildError> {
+pub fn validated_rms(closed_loop: &Loop, validation: &[Trajectory], model: &[u8], seed: u64) -> Result<f32, BuildError> {
     let model = Model::from_bytes(model).map_err(ExportError::Refused)?;
-    let errors = plant.unguarded().errors(validation, Some((&model, Lanes::BOTH)), 1.0, seed);
+    let errors = closed_loop.unguarded().errors(validation, Some((&model, Lanes::BOTH)), 1.0, seed);
     let mut errors = errors.map_err(FlightsError::from)?;
     errors.sort_by(f64::total_cmp);
     Ok(errors.get(errors.len() / 2).copied().unwrap_or(0.0) as f32)

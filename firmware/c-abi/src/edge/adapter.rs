@@ -74,7 +74,7 @@ unsafe fn fill(
         &mut *stage
     };
     stage.load(model, table, rate_hz)?;
-    stage.restart(first_tick);
+    stage.clear(first_tick);
     Ok(())
 }
 
@@ -95,7 +95,7 @@ pub unsafe extern "C" fn impromptu_adapter_push(adapter: *mut AdapterMemory, des
 pub unsafe extern "C" fn impromptu_adapter_restart(adapter: *mut AdapterMemory, first_tick: i32) -> Status {
     report(|| {
         // SAFETY: the module's rules.
-        unsafe { object::<Stage>(adapter)?.restart(first_tick) };
+        unsafe { object::<Stage>(adapter)?.clear(first_tick) };
         Ok(())
     })
 }

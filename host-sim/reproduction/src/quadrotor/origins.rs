@@ -16,7 +16,7 @@ const SECTION: &str = "Difference learning and its reference point";
 
 /// Flies the four choices, and trains without differences.
 pub(super) fn run(ground: &Ground<'_>, twelve_inputs: &Learned, study: &mut Study) -> anyhow::Result<()> {
-    let plant = &ground.plant;
+    let closed_loop = &ground.closed_loop;
     let choices: Vec<(Origin, Origin)> = [Origin::Desired, Origin::Measured]
         .into_iter()
         .flat_map(|inputs| [(inputs, Origin::Desired), (inputs, Origin::Measured)])
@@ -25,13 +25,13 @@ pub(super) fn run(ground: &Ground<'_>, twelve_inputs: &Learned, study: &mut Stud
         .par_iter()
         .map(|&(inputs, base)| {
             let list = twelve(inputs);
-            let network = twelve_inputs.file(plant, &twelve_inputs.network, &list, base)?;
-            let ridge = twelve_inputs.file(plant, &twelve_inputs.ridge, &list, base)?;
+            let network = twelve_inputs.file(closed_loop, &twelve_inputs.network, &list, base)?;
+            let ridge = twelve_inputs.file(closed_loop, &twelve_inputs.ridge, &list, base)?;
             Ok([
-                ground.test.reduction(plant, &network)?,
-                ground.validation.reduction(plant, &network)?,
-                ground.test.reduction(plant, &ridge)?,
-                ground.validation.reduction(plant, &ridge)?,
+                ground.test.reduction(closed_loop, &network)?,
+                ground.validation.reduction(closed_loop, &network)?,
+                ground.test.reduction(closed_loop, &ridge)?,
+                ground.validation.reduction(closed_loop, &ridge)?,
             ])
         })
         .collect::<anyhow::Result<_>>()?;
@@ -47,10 +47,10 @@ pub(super) fn run(ground: &Ground<'_>, twelve_inputs: &Learned, study: &mut Stud
             );
         }
     }
-    let whole = learn(&ground.recipe(twelve(Origin::Nothing)), plant, &ground.logs, false)?;
+    let whole = learn(&ground.recipe(twelve(Origin::Nothing)), closed_loop, &ground.logs, false)?;
     for (map, network) in [("network", &whole.network), ("ridge", &whole.ridge)] {
-        let file = whole.file(plant, network, &twelve(Origin::Nothing), Origin::Nothing)?;
-        let (test, validation) = (ground.test.reduction(plant, &file)?, ground.validation.reduction(plant, &file)?);
+        let file = whole.file(closed_loop, network, &twelve(Origin::Nothing), Origin::Nothing)?;
+        let (test, validation) = (ground.test.reduction(closed_loop, &file)?, ground.validation.reduction(closed_loop, &file)?);
         report(
             study,
             &format!("no_difference_{map}"),

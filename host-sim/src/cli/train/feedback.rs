@@ -6,18 +6,18 @@ use impromptu_training::{LaneChoice, Purpose, Recipe, choose_lane};
 
 use super::super::Invocation;
 
-/// Designs lanes from `logs` and chooses one by flights of `plant` over the `validation` trajectories, or says why there is none.
+/// Designs lanes from `logs` and chooses one by flights of `closed_loop` over the `validation` trajectories, or says why there is none.
 pub(super) fn choose(
     invocation: &Invocation,
     recipe: &Recipe,
-    plant: Option<&Loop>,
+    closed_loop: Option<&Loop>,
     logs: &[FlightLog],
     validation: &[Trajectory],
     encode: &(dyn Fn(&LaneDescription) -> Result<Vec<u8>, ExportError> + Sync),
 ) -> Result<LaneChoice, String> {
-    let Some(plant) = plant else {
+    let Some(closed_loop) = closed_loop else {
         return Err("it is chosen by simulated flights, and no vehicle was given; give --vehicle".into());
     };
     let flight_seed = invocation.configuration.seed_of(Purpose::Validation);
-    choose_lane(recipe, plant, logs, validation, flight_seed, encode).map_err(|reason| reason.to_string())
+    choose_lane(recipe, closed_loop, logs, validation, flight_seed, encode).map_err(|reason| reason.to_string())
 }

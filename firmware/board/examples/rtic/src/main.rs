@@ -21,8 +21,8 @@ mod servo;
 mod app {
     use cortex_m::peripheral::syst::SystClkSource;
     use impromptu_firmware::{
+        AddOn,
         adapter::{Job, Lanes},
-        add_on::AddOn,
         model::Model,
         network::Scratch,
     };
@@ -82,6 +82,13 @@ mod app {
         timer.enable_interrupt();
         let (servo, error) = (Servo::new(), TrackingError::new());
         (Shared { add_on }, Local { model, scratch, servo, tick: 0, ahead, error, alone: None })
+    }
+
+    #[idle]
+    fn idle(_: idle::Context) -> ! {
+        loop {
+            cortex_m::asm::wfi();
+        }
     }
 
     #[task(binds = SysTick, priority = 2, local = [servo, tick, ahead, error, alone], shared = [add_on])]
