@@ -15,7 +15,7 @@ use impromptu_report::{
 use impromptu_sim::{
     flight_log::FlightLog,
     rollout::{FlightPlan, fly_on},
-    trajectory::{Sample, Trajectory},
+    trajectory::{Sample, Trajectory, tones::smooth_step},
 };
 use impromptu_training::{Purpose, derived};
 use rayon::prelude::*;
@@ -40,12 +40,9 @@ fn step_to(height: f64, rate_hz: f64) -> Trajectory {
     let lead = rate_hz.round() as usize;
     let count = (SETTLED * rate_hz) as usize;
     let at = |index: usize| {
-        let s = ((index as f64 - lead as f64) / rate_hz / STEP).clamp(0.0, 1.0);
-        let rise = s * s * s * (10.0 - s * (15.0 - 6.0 * s));
-        let speed = 30.0 * s * s * (1.0 - s) * (1.0 - s) / STEP;
-        let bend = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (STEP * STEP);
+        let [rise, speed, bend] = smooth_step((index as f64 - lead as f64) / rate_hz / STEP);
         let along = |value: f64| [0.0, 0.0, height * value];
-        Sample { position: along(rise), velocity: along(speed), acceleration: along(bend), yaw: 0.0 }
+        Sample { position: along(rise), velocity: along(speed / STEP), acceleration: along(bend / (STEP * STEP)), yaw: 0.0 }
     };
     Trajectory { name: format!("step to {height} m"), rate_hz, samples: (0..count).map(at).collect(), scored: lead..count }
 }

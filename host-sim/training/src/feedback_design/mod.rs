@@ -19,7 +19,6 @@ pub mod excitation;
 pub mod identification;
 pub mod lane;
 pub mod margins;
-mod normal_equations;
 mod refusal;
 pub mod response;
 pub mod riccati;
