@@ -1,9 +1,9 @@
 //! The network in a task of lower priority: `cargo run -p impromptu-firmware --example deferred`.
 //!
-//! The control task hands the features over and goes on; while the loop waits for its next tick, the other task evaluates the network; the
-//! control task takes the result at that tick. In time it makes no difference, to the bit: the correction is ramped, and a ramp starts
-//! where the last one ended. Here both tasks are functions, called in turns that are easy to follow; `firmware/board/examples` has them as
-//! tasks of RTIC and embassy.
+//! The control task hands the features over and goes on; while the loop waits for its next tick, the other task evaluates the
+//! network; the control task takes the result at that tick. In time it makes no difference, to the bit: the correction is ramped,
+//! and a ramp starts where the last one ended. Here both tasks are functions, called in turns that are easy to follow;
+//! `firmware/board/examples` has them as tasks of RTIC and embassy.
 
 #[path = "one_axis/servo.rs"]
 pub(crate) mod servo;

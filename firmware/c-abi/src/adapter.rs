@@ -1,7 +1,7 @@
 //! The add-on alone, with as many channels as its signal table has at run time.
 //!
-//! *in* desired and measured channels, counted; *out* reference channels; *never* other bits than those of an add-on whose arrays have just these
-//! channels; *source* [`impromptu_firmware::add_on`].
+//! *in* desired and measured channels, counted; *out* reference channels; *never* other bits than those of an add-on whose arrays
+//! have just these channels; *source* [`impromptu_firmware::add_on`].
 
 use impromptu_firmware::{AddOn, add_on::NotFinite};
 

@@ -1,4 +1,5 @@
-//! The add-on is the adapter with the trajectory ahead of it: the same bits, in place too, and the desired reference without a model.
+//! The add-on is the adapter with the trajectory ahead of it: the same bits, in place too, and the desired reference without a
+//! model.
 
 use impromptu_firmware::{
     adapter::{Adapter, Lanes},
@@ -34,7 +35,9 @@ proptest! {
 
     /// Whole ticks, and ticks whose network is evaluated later, whatever was in the add-on's place before.
     #[test]
-    fn an_add_on_gives_the_bits_of_an_adapter(seed in any::<u64>(), first in -500i32..500, linear in any::<bool>(), deferred in any::<bool>()) {
+    fn an_add_on_gives_the_bits_of_an_adapter(
+        seed in any::<u64>(), first in -500i32..500, linear in any::<bool>(), deferred in any::<bool>(),
+    ) {
         let interpolation = if linear { Interpolation::Linear } else { Interpolation::Hold };
         let (description, bytes) = violent(seed, interpolation);
         let model = Model::from_bytes(&bytes).unwrap();

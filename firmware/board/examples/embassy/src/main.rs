@@ -1,11 +1,13 @@
 //! A servo with the add-on as tasks of embassy: 20 s along a trajectory by the loop alone, then 20 s with the add-on.
 //!
 //! - in: the model, in the program's flash; the angle, here of a simulated servo
-//! - out: the motor's reference, here to the simulated servo; one line of JSON on standard output: errors in degrees, RMS and largest
-//! - never: clocks or pins, so that it runs on the emulated board as it is. SysTick wakes the control task; there is no time driver
+//! - out: the motor's reference, here to the simulated servo; one line of JSON on standard output: errors in degrees, RMS and
+//!   largest
+//! - never: clocks or pins, so that it runs on the emulated board as it is. SysTick wakes the control task; there is no time
+//!   driver
 //!
-//! Tasks of one executor wait for each other: a control tick may be late by one evaluation of the network. A loop that cannot bear that runs
-//! `control` in an `InterruptExecutor` of higher priority; nothing else changes.
+//! Tasks of one executor wait for each other: a control tick may be late by one evaluation of the network. A loop that cannot
+//! bear that runs `control` in an `InterruptExecutor` of higher priority; nothing else changes.
 //!
 //! `cargo run -p impromptu-example-embassy --target thumbv7em-none-eabihf --profile firmware` (needs qemu-system-arm).
 #![cfg_attr(target_os = "none", no_std, no_main)]

@@ -1,8 +1,10 @@
 //! A servo with the add-on as tasks of RTIC: 20 s along a trajectory by the loop alone, then 20 s with the add-on.
 //!
 //! - in: the model, in the program's flash; the angle, here of a simulated servo
-//! - out: the motor's reference, here to the simulated servo; one line of JSON on standard output: errors in degrees, RMS and largest
-//! - never: a control tick that waits for the network. It touches no clocks or pins, so that it runs on the emulated board as it is
+//! - out: the motor's reference, here to the simulated servo; one line of JSON on standard output: errors in degrees, RMS and
+//!   largest
+//! - never: a control tick that waits for the network. It touches no clocks or pins, so that it runs on the emulated board as it
+//!   is
 //!
 //! | task | bound to | priority | |
 //! |---|---|---|---|
