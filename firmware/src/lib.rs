@@ -14,8 +14,8 @@
 //!
 //! # A whole use
 //!
-//! A servo's position loop runs at 500 Hz and lags behind; the model was trained on its logs. [`AddOn`] comes between the trajectory
-//! and the loop. In a static, without a model, with the network in another task: see there, and `examples/`.
+//! A servo's position loop runs at 500 Hz and lags behind; the model was trained on its logs. [`AddOn`] comes between the
+//! trajectory and the loop. In a static, without a model, with the network in another task: see there, and `examples/`.
 //!
 //! ```
 //! use impromptu_firmware::{AddOn, Channel, Channels, EndRule, Lanes, Model, Scratch};

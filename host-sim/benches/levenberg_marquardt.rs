@@ -1,4 +1,5 @@
-//! Levenberg-Marquardt to convergence on both systems of the paper: the 3-20-20-1 networks of `study lti`, default settings, on all cores.
+//! Levenberg-Marquardt to convergence on both systems of the paper: the 3-20-20-1 networks of `study lti`, default settings, on
+//! all cores.
 
 use std::time::Instant;
 

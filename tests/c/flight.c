@@ -1,6 +1,6 @@
 /*
- * Flies what `script.bin` says with the flight stack and with the adapter alone, each in one piece and with the network's work apart, and
- * writes every number to `answers.bin`. The same file runs on the host and on the emulated board.
+ * Flies what `script.bin` says with the flight stack and with the adapter alone, each in one piece and with the network's work
+ * apart, and writes every number to `answers.bin`. The same file runs on the host and on the emulated board.
  */
 #include <stdio.h>
 #include <string.h>

@@ -1,11 +1,12 @@
 //! The structure of the crates' sources: which file uses which, and whether that runs the way the crate's first page states.
 //!
-//! *in* the sources below a `src/lib.rs`; *out* arrows from file to file, circles, arrows against the stated order; *never* test code, or a
-//! re-export taken for a use; *source* `use` declarations and paths, read with `syn`. A name that another file merely hands on counts as an
-//! arrow to the file that defines it.
+//! *in* the sources below a `src/lib.rs`; *out* arrows from file to file, circles, arrows against the stated order; *never* test
+//! code, or a re-export taken for a use; *source* `use` declarations and paths, read with `syn`. A name that another file merely
+//! hands on counts as an arrow to the file that defines it.
 //!
-//! The order stands in the documentation of each crate's root, as rows of a table: `| 1 | ``math``, ``preview`` | what they hold |`,
-//! with single back ticks, the lowest layer first. A module uses lower layers only, or itself.
+//! The order stands in the documentation of each crate's root, as rows of a table:
+//! `| 1 | ``math``, ``preview`` | what they hold |`, with single back ticks, the lowest layer first. A module uses lower layers
+//! only, or itself.
 
 mod module;
 mod resolve;

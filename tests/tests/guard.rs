@@ -117,8 +117,8 @@ fn compared(name: &str, closed_loop: &Loop, trajectories: &[Trajectory], bytes: 
 }
 
 /// Lanes with the noise believed and full authority everywhere, in a loop 20 ms later than their logs: one with a hundredth of
-/// the control weight and clamps wide open, whose good flights go astray now and then, and one without any weight on the velocity, as the
-/// pilot's was, which never flies.
+/// the control weight and clamps wide open, whose good flights go astray now and then, and one without any weight on the
+/// velocity, as the pilot's was, which never flies.
 #[test]
 fn an_aggressive_feedback_lane_in_a_late_loop_is_handed_over_in_time() {
     let closed_loop = closed_loop("crazyflie", "rough");

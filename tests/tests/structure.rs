@@ -1,4 +1,5 @@
-//! The crates are houses with floors: no circle between files, and every use runs down the layers that the crate's first page states.
+//! The crates are houses with floors: no circle between files, and every use runs down the layers that the crate's first page
+//! states.
 
 use impromptu_tests::{
     emulator::workspace,

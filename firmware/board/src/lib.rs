@@ -1,7 +1,7 @@
 //! What both boards share: how they start, what their tasks do, where models lie, what motors get.
 //!
-//! The programs are in `src/bin/`, each for one board: they own the peripherals and give their tasks what is here. Nothing here touches a
-//! register, so that the same code is checked on the host.
+//! The programs are in `src/bin/`, each for one board: they own the peripherals and give their tasks what is here. Nothing here
+//! touches a register, so that the same code is checked on the host.
 //!
 //! | layer | modules | what they hold |
 //! |--:|---|---|

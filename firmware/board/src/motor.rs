@@ -1,8 +1,9 @@
 //! Rotor speed to duty cycle of a Crazyflie's brushed motors.
 //!
-//! *in* fraction of the largest rotor speed; *out* share of the time in which the motor is driven; *never* outside of 0..=1, other than 0
-//! for a motor that is off, or falling with a growing speed; *source* rpm = 0.2685 pwm + 4070.3, pwm of 16 bits: the constants
-//! `PWM2RPM_SCALE` and `PWM2RPM_CONST` of gym-pybullet-drones (Panerati 2021), from the thrust measurements of Luis and Le Ny 2016.
+//! *in* fraction of the largest rotor speed; *out* share of the time in which the motor is driven; *never* outside of 0..=1,
+//! other than 0 for a motor that is off, or falling with a growing speed; *source* rpm = 0.2685 pwm + 4070.3, pwm of 16 bits: the
+//! constants `PWM2RPM_SCALE` and `PWM2RPM_CONST` of gym-pybullet-drones (Panerati 2021), from the thrust measurements of Luis and
+//! Le Ny 2016.
 //!
 //! A battery that is not full turns the rotors slower: who flies fast compensates the voltage.
 

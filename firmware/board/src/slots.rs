@@ -1,6 +1,7 @@
 //! Where models lie in flash: the last two sectors, which memory.x keeps free of the program.
 //!
-//! *in* nothing; *out* the bytes of both slots; *never* what the compiler thinks that they are; *source* RM0090, table 5: sectors 10 and 11.
+//! *in* nothing; *out* the bytes of both slots; *never* what the compiler thinks that they are; *source* RM0090, table 5: sectors
+//! 10 and 11.
 
 use core::hint::black_box;
 
@@ -11,7 +12,8 @@ pub const SLOT: usize = 128 * 1024;
 #[repr(C, align(16))]
 struct Slots([[u8; SLOT]; 2]);
 
-/// Named so that memory.x places it over the sectors. It is not loaded: the zeros are the compiler's alone, who does not know of uploads.
+/// Named so that memory.x places it over the sectors. It is not loaded: the zeros are the compiler's alone, who does not know of
+/// uploads.
 static IMPROMPTU_SLOTS: Slots = Slots([[0; SLOT]; 2]);
 
 /// What the flash holds.

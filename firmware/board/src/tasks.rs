@@ -1,7 +1,7 @@
 //! What the tasks of a board do; which interrupt runs them is the board's affair.
 //!
-//! *in* bytes, control ticks, jobs, pieces of models; *out* motor commands, and which task of lower priority has something to do; *never* a
-//! wait for a task of lower priority: everything between them goes through mailboxes.
+//! *in* bytes, control ticks, jobs, pieces of models; *out* motor commands, and which task of lower priority has something to do;
+//! *never* a wait for a task of lower priority: everything between them goes through mailboxes.
 
 use core::{
     hint::black_box,

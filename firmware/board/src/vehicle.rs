@@ -1,6 +1,7 @@
 //! The vehicle that the boards fly, its rates and its link.
 //!
-//! *in* nothing; *out* constants; *never* more bytes on the link than its rate carries; *source* `host-sim`'s vehicle `crazyflie`.
+//! *in* nothing; *out* constants; *never* more bytes on the link than its rate carries; *source* `host-sim`'s vehicle
+//! `crazyflie`.
 
 use impromptu_flight::{
     control::{Airframe, AttitudeGains, PositionGains},
@@ -15,8 +16,8 @@ pub const CORE_HZ: u32 = 168_000_000;
 /// Bits a second on the link of the real board, ten for a byte.
 pub const LINK_BAUD: u32 = 1_000_000;
 
-/// Bytes a second that a flight takes to the vehicle: an attitude of 39 bytes at every control tick, a position of 39 and a setpoint of 50 at
-/// every reference tick. From the vehicle: motors of 51 at every control tick, some telemetry.
+/// Bytes a second that a flight takes to the vehicle: an attitude of 39 bytes at every control tick, a position of 39 and a
+/// setpoint of 50 at every reference tick. From the vehicle: motors of 51 at every control tick, some telemetry.
 const LINK_BYTES: u32 = 39 * CONTROL_HZ + (39 + 50) * CONTROL_HZ / 5;
 const _: () = assert!(LINK_BAUD >= 3 * 10 * LINK_BYTES, "what is said again, and an upload, need room too");
 

@@ -138,7 +138,8 @@ impl<'m> Flight<'m> {
         (self.wanted, self.reference, self.dither) = (ThrustVector::NONE, Reference::ORIGIN, Vector3::zeros());
     }
 
-    /// Puts an add-on before the configured loops, with the lanes given, in the place of the one that was there. The trajectory stays.
+    /// Puts an add-on before the configured loops, with the lanes given, in the place of the one that was there. The trajectory
+    /// stays.
     ///
     /// # Errors
     /// If the model is for other signals, another rate, or a longer preview; what was attached then stays. A flight stack without

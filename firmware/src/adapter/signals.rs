@@ -79,8 +79,8 @@ pub(super) fn same_signals(card: &Card<'_>, table: &Channels<'_>, limits: [usize
     Ok(())
 }
 
-/// Refuses an application whose channels do not fit into arrays of `limits` channels, or whose reference has a channel without a desired
-/// one of the same name.
+/// Refuses an application whose channels do not fit into arrays of `limits` channels, or whose reference has a channel without a
+/// desired one of the same name.
 pub(super) fn whole_signals(table: &Channels<'_>, limits: [usize; 3]) -> Result<(), Refusal> {
     let counts = [("desired", table.desired.len()), ("measured", table.measured.len()), ("reference", table.reference.len())];
     for ((signal, count), limit) in counts.into_iter().zip(limits) {

@@ -1,7 +1,8 @@
 //! The add-on that a prediction is about: a linear window over the desired output, learned from a log.
 //!
-//! *in* a log, a window; *out* references for a desired output; *never* a state or a past reference as input, so that it stays bounded
-//! whatever the zeros; *source* Zhou 2017, Insight 1 and Section V (difference learning), with y_d over a window in the place of the state.
+//! *in* a log, a window; *out* references for a desired output; *never* a state or a past reference as input, so that it stays
+//! bounded whatever the zeros; *source* Zhou 2017, Insight 1 and Section V (difference learning), with y_d over a window in the
+//! place of the state.
 
 use serde::Serialize;
 
@@ -39,7 +40,8 @@ pub struct AddOn {
 const PENALTY: f64 = 1e-7;
 
 impl AddOn {
-    /// Learns, row by row, which reference was in force when the measured output went along the window. `None` if the log is too short.
+    /// Learns, row by row, which reference was in force when the measured output went along the window. `None` if the log is too
+    /// short.
     pub fn fit<'a>(segments: impl IntoIterator<Item = &'a Segment>, window: Window, features: Features) -> Option<Self> {
         let columns = window.past + window.preview + 2;
         let mut regression = Regression::new(columns, 1);

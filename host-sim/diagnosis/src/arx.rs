@@ -1,8 +1,8 @@
 //! High-order ARX: what whitens the noise, whatever colour it has.
 //!
-//! *in* a record; *out* A and the variance of the white innovations; *never* an order that the record cannot carry; *source* Ljung,
-//! "System Identification", 2nd ed., 10.1: A y = B u + e by least squares, order by Akaike's criterion. With growing order 1/A
-//! approaches the noise's shaping filter for any stationary noise.
+//! *in* a record; *out* A and the variance of the white innovations; *never* an order that the record cannot carry; *source*
+//! Ljung, "System Identification", 2nd ed., 10.1: A y = B u + e by least squares, order by Akaike's criterion. With growing order
+//! 1/A approaches the noise's shaping filter for any stationary noise.
 
 use crate::{
     least_squares::Regression,

@@ -114,7 +114,8 @@ pub struct Diagnosis {
     pub recommended_sub_rate_hz: f64,
     /// Preview recommended for the add-on, s.
     pub recommended_preview_s: f64,
-    /// What a bounded window over the desired output reaches, with the features recommended. Where the inverse is unstable this is all there is.
+    /// What a bounded window over the desired output reaches, with the features recommended. Where the inverse is unstable this
+    /// is all there is.
     pub prediction: Prediction,
     /// The same with difference learning where that is not allowed.
     pub with_difference_learning: Option<Prediction>,
@@ -235,8 +236,8 @@ pub fn diagnose(record: &Record, settings: &Settings) -> Result<Diagnosis, Diagn
     })
 }
 
-/// Four evaluations in the time by which the loop lags, and five in the shortest period that it passes: with interpolation between them
-/// more rates only cost (facts 4.2, items 4 and 6).
+/// Four evaluations in the time by which the loop lags, and five in the shortest period that it passes: with interpolation
+/// between them more rates only cost (facts 4.2, items 4 and 6).
 fn recommended_divisor(properties: &Properties, band_hz: f64, period_s: f64) -> usize {
     let time = (properties.lag_s.value / 4.0).min(1.0 / (5.0 * band_hz));
     (time / period_s).floor().max(1.0) as usize

@@ -15,8 +15,8 @@ pub struct Coverage {
     pub share: f64,
     /// Highest frequency with that coherence, Hz.
     pub highest_hz: f64,
-    /// Lowest frequency that the record shows, Hz: a twentieth of the reference's variance is at it and below. What happens at rest is
-    /// extrapolated from here.
+    /// Lowest frequency that the record shows, Hz: a twentieth of the reference's variance is at it and below. What happens at
+    /// rest is extrapolated from here.
     pub lowest_hz: f64,
     /// Number of coefficients that the reference can tell apart, at most [`LAGS`]: two for each tone.
     pub order: usize,
@@ -95,8 +95,8 @@ fn coherent(line: &(f64, f64, Complex<f64>)) -> bool {
     line.2.norm_sqr() > COHERENT * line.0 * line.1 && line.0 > 0.0
 }
 
-/// Frequency, Hz, below which 95 % of what passes the loop lies: magnitude of the cross spectrum of increments, of coherent lines. Half the
-/// record's rate if there are none.
+/// Frequency, Hz, below which 95 % of what passes the loop lies: magnitude of the cross spectrum of increments, of coherent
+/// lines. Half the record's rate if there are none.
 pub fn band(record: &Record) -> f64 {
     let spectra = Spectra::new(record, window(record));
     let passing = |line: &(f64, f64, Complex<f64>)| if coherent(line) { line.2.norm() } else { 0.0 };
@@ -114,7 +114,8 @@ pub fn band(record: &Record) -> f64 {
 /// Share of the reference's variance that lies at the lowest frequency and below.
 const SLOW_SHARE: f64 = 0.05;
 
-/// Lowest frequency that the reference shows, Hz (see [`Coverage::lowest_hz`]); 0 if stretches at different heights show the rest itself.
+/// Lowest frequency that the reference shows, Hz (see [`Coverage::lowest_hz`]); 0 if stretches at different heights show the rest
+/// itself.
 pub fn lowest(record: &Record) -> f64 {
     let all: Vec<f64> = record.segments.iter().flat_map(|segment| segment.reference.iter().copied()).collect();
     let middle = mean(&all);

@@ -1,9 +1,10 @@
 //! From a record to a transfer function with the covariance of its coefficients.
 //!
 //! *in* a record at the sub-rate; *out* [`Identified`]; *never* an unstable model; *source* Zhu and Hjalmarsson, "The Box-Jenkins
-//! Steiglitz-McBride algorithm", Automatica 65 (2016): whiten with the high-order [`Arx`], then Steiglitz-McBride; here polished by
-//! Levenberg-Marquardt on the same whitened output error. Consistent for noise of any colour, because the reference does not depend on it.
-//! Order, length of the numerator and dead time: Schwarz's criterion (BIC), whose weights also say how sure the dead time is.
+//! Steiglitz-McBride algorithm", Automatica 65 (2016): whiten with the high-order [`Arx`], then Steiglitz-McBride; here polished
+//! by Levenberg-Marquardt on the same whitened output error. Consistent for noise of any colour, because the reference does not
+//! depend on it. Order, length of the numerator and dead time: Schwarz's criterion (BIC), whose weights also say how sure the
+//! dead time is.
 
 use nalgebra::{DMatrix, DVector};
 use rand::Rng;
@@ -22,8 +23,8 @@ use crate::{
 pub struct Identified {
     /// The model.
     pub model: TransferFunction,
-    /// Covariance of numerator, denominator without its first 1, whitened offset, in this order; larger than white errors explain where
-    /// the model is not the whole truth.
+    /// Covariance of numerator, denominator without its first 1, whitened offset, in this order; larger than white errors explain
+    /// where the model is not the whole truth.
     pub covariance: DMatrix<f64>,
     /// Weight of each dead time, in ticks, after the data; they sum to 1.
     pub dead_times: Vec<(usize, f64)>,
@@ -37,8 +38,8 @@ pub struct Identified {
 const HIGHEST_ORDER: usize = 4;
 /// Blocks from which the errors' spread is taken, at most: fewer and longer ones where the loop settles slowly.
 const MOST_BLOCKS: usize = 60;
-/// A draw that leaves more than this times what the model leaves of the log, in mean square, could not be the true one: where poles nearly
-/// cancel zeros, a normal distribution of coefficients reaches far out of the data's valley.
+/// A draw that leaves more than this times what the model leaves of the log, in mean square, could not be the true one: where
+/// poles nearly cancel zeros, a normal distribution of coefficients reaches far out of the data's valley.
 const WORSE: f64 = 1.5;
 /// Longest dead time tried, ticks.
 const LONGEST_DEAD_TIME: usize = 12;
@@ -104,8 +105,8 @@ pub fn identify(record: &Record) -> Option<Identified> {
     })
 }
 
-/// The offset that leaves no mean. Whitening takes slow noise away and the constant with it, so that the whitened one is uncertain. Gives the
-/// mean square of what is then left.
+/// The offset that leaves no mean. Whitening takes slow noise away and the constant with it, so that the whitened one is
+/// uncertain. Gives the mean square of what is then left.
 fn level(model: &mut TransferFunction, record: &Record) -> f64 {
     let (mut sum, mut squares, mut count) = (0.0, 0.0, 0);
     for segment in &record.segments {
@@ -125,7 +126,8 @@ fn best(candidates: &[Candidate]) -> Option<&Candidate> {
 }
 
 impl Identified {
-    /// Models that could as well be the true one: stable draws from the coefficients' distribution, each with the offset that suits the record.
+    /// Models that could as well be the true one: stable draws from the coefficients' distribution, each with the offset that
+    /// suits the record.
     pub fn draws(&self, record: &Record, count: usize, random: &mut impl Rng) -> Vec<TransferFunction> {
         let size = self.covariance.nrows();
         // A tenth of a millionth more on the diagonal: rounding may have made the matrix indefinite.
@@ -312,9 +314,9 @@ impl Whitened {
         }
     }
 
-    /// Covariance of coefficients of a model that is not the whole truth: from the spread of the blocks' pulls on the coefficients
-    /// (Liang and Zeger, "Longitudinal data analysis using generalized linear models", Biometrika 73 (1986), blocks for subjects), where
-    /// that is more than white errors explain.
+    /// Covariance of coefficients of a model that is not the whole truth: from the spread of the blocks' pulls on the
+    /// coefficients (Liang and Zeger, "Longitudinal data analysis using generalized linear models", Biometrika 73 (1986), blocks
+    /// for subjects), where that is more than white errors explain.
     fn robust(&self, model: &TransferFunction, white: &DMatrix<f64>) -> DMatrix<f64> {
         let length = (2 * model.settling()).max(self.rows / MOST_BLOCKS).max(1);
         let size = white.nrows();

@@ -9,8 +9,9 @@
 //! The channel is u (reference, in the baseline the desired output) to y (measured). Units are the log's; times are seconds,
 //! frequencies hertz, offsets ticks of the sub-rate. Everything random comes from one seed.
 //!
-//! At the bottom are polynomials, records and the one regression, which whoever trains something uses as well; a model of the loop is identified from them, its properties are read off,
-//! a prediction is made, and the gates judge. The report puts it all into words.
+//! At the bottom are polynomials, records and the one regression, which whoever trains something uses as well; a model of the
+//! loop is identified from them, its properties are read off, a prediction is made, and the gates judge. The report puts it all
+//! into words.
 //!
 //! | layer | modules | what they hold |
 //! |---|---|---|

@@ -54,8 +54,8 @@ pub fn is_stable(denominator: &[f64]) -> bool {
     true
 }
 
-/// Roots in z of `c0 zⁿ + c1 zⁿ⁻¹ + …`, by falling magnitude: eigenvalues of the companion matrix. Leading zeros are dropped; a constant has
-/// no root.
+/// Roots in z of `c0 zⁿ + c1 zⁿ⁻¹ + …`, by falling magnitude: eigenvalues of the companion matrix. Leading zeros are dropped; a
+/// constant has no root.
 pub fn roots(polynomial: &[f64]) -> Vec<Complex<f64>> {
     let start = polynomial.iter().position(|c| *c != 0.0).unwrap_or(polynomial.len());
     let Some((leading, rest)) = polynomial[start..].split_first() else { return Vec::new() };

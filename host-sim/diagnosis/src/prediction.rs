@@ -1,9 +1,10 @@
 //! What the add-on will reach, before it is trained: the whole procedure is repeated on models that could be the true loop.
 //!
 //! *in* a record, its identified model, draws; *out* a [`Prediction`]; *never* a flight along what the add-on was trained on;
-//! *source* parametric bootstrap (Efron and Tibshirani, "An Introduction to the Bootstrap", 1993, ch. 6). In each draw the log is simulated
-//! again with the log's own noise in other places, the add-on learns from that, and flies along half of the log's references run backwards
-//! at another speed: of the same kind, and new to it (backwards alone, tones would be those that it was trained on). Errors are measured ones, so the noise floor is in them.
+//! *source* parametric bootstrap (Efron and Tibshirani, "An Introduction to the Bootstrap", 1993, ch. 6). In each draw the log is
+//! simulated again with the log's own noise in other places, the add-on learns from that, and flies along half of the log's
+//! references run backwards at another speed: of the same kind, and new to it (backwards alone, tones would be those that it was
+//! trained on). Errors are measured ones, so the noise floor is in them.
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -49,7 +50,8 @@ const PREVIEWS: [usize; 8] = [0, 1, 2, 4, 7, 11, 16, 24];
 const PASTS: [usize; 4] = [2, 4, 8, 14];
 /// A smaller window is taken if its error is at most this factor of the least one.
 const TOLERANCE: f64 = 1.03;
-/// What the draws cannot know (signals of the same kind, the form of the model) widens their interval by this share of its half widths...
+/// What the draws cannot know (signals of the same kind, the form of the model) widens their interval by this share of its half
+/// widths...
 const WIDENING: f64 = 0.3;
 /// ...and by this much, in percentage points.
 const LEAST_WIDENING: f64 = 0.5;
@@ -99,8 +101,8 @@ pub fn predict(
     let reduction = |(baseline, error): &(f64, f64)| 100.0 * (1.0 - error / baseline);
     let found = Interval::of(reduction(&(baseline, error)), outcomes.iter().map(reduction));
     let floor = root_mean_square(identified.noise.iter().flatten().copied());
-    // What the model does not explain need not come from outside: so far as it is the loop's own answer to its references (limits, other
-    // axes), the add-on's references, which move more, bring it a second time.
+    // What the model does not explain need not come from outside: so far as it is the loop's own answer to its references
+    // (limits, other axes), the add-on's references, which move more, bring it a second time.
     let twice = |error: f64| error.hypot(AGAIN * floor);
     let wider = |end: f64| end + (end - found.value) * WIDENING + (end - found.value).signum() * LEAST_WIDENING;
     let least = wider(found.low).min(found.value - LEAST_WIDENING);

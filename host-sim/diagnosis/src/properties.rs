@@ -82,12 +82,13 @@ pub struct Properties {
     pub strict_degree: RelativeDegree,
     /// Practical: the first tick at which the step response is above [`THRESHOLD`] of its end.
     pub practical_degree: RelativeDegree,
-    /// Steady-state gain. So far as errors are not white, and the model perhaps not the whole truth, the interval is wider by what the
-    /// model's gain changes between the lowest frequency that the record shows and rest: that is extrapolated.
+    /// Steady-state gain. So far as errors are not white, and the model perhaps not the whole truth, the interval is wider by
+    /// what the model's gain changes between the lowest frequency that the record shows and rest: that is extrapolated.
     pub gain: Interval,
     /// Output at zero input, in the output's unit.
     pub offset: Interval,
-    /// How far the step response first goes the wrong way, as a share of its end (above 1: further than the end itself); 0: it does not.
+    /// How far the step response first goes the wrong way, as a share of its end (above 1: further than the end itself); 0: it
+    /// does not.
     pub reversal: Interval,
     /// Ticks until the step response has its final sign for good.
     pub reversal_ticks: usize,
@@ -113,8 +114,8 @@ const LEAST_REVERSAL: f64 = 0.02;
 const HORIZON: usize = 400;
 
 impl Properties {
-    /// Properties of a model that was identified from the record, which shows nothing below `lowest_hz`; `draws` are other models that
-    /// could be the true one.
+    /// Properties of a model that was identified from the record, which shows nothing below `lowest_hz`; `draws` are other models
+    /// that could be the true one.
     pub fn of(identified: &Identified, draws: &[TransferFunction], record: &Record, lowest_hz: f64) -> Self {
         let period_s = record.period_s;
         let model = &identified.model;
@@ -143,8 +144,9 @@ impl Properties {
     }
 }
 
-/// The gain, and 95 % of it by the coefficients' covariance, linearised: draws of coefficients whose poles nearly cancel zeros leave the
-/// valley in which the data hold them, and their gains with it. Below `angle`, in radians a sample, the record shows nothing.
+/// The gain, and 95 % of it by the coefficients' covariance, linearised: draws of coefficients whose poles nearly cancel zeros
+/// leave the valley in which the data hold them, and their gains with it. Below `angle`, in radians a sample, the record shows
+/// nothing.
 fn gain(identified: &Identified, angle: f64) -> Interval {
     let Identified { model, covariance, .. } = identified;
     let value = model.gain();

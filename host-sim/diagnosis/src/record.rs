@@ -1,7 +1,7 @@
 //! Records of a channel: what was asked, what was measured, at a uniform rate.
 //!
-//! *in* columns of time, reference and measured value; *out* a [`Record`]; *never* a number that is not finite, nor time that is not
-//! uniform: a few lost rows are filled, more is refused; *source* Zhou 2017, Fig. 1: u and y of the baseline.
+//! *in* columns of time, reference and measured value; *out* a [`Record`]; *never* a number that is not finite, nor time that is
+//! not uniform: a few lost rows are filled, more is refused; *source* Zhou 2017, Fig. 1: u and y of the baseline.
 
 use serde::Serialize;
 
@@ -155,8 +155,8 @@ impl Record {
         self.len() == 0
     }
 
-    /// The record at every `divisor`-th sample. Both columns go through the same zero-phase mean of `divisor` samples first, which
-    /// leaves the relation of one to the other as it is and takes away what the slower rate cannot show.
+    /// The record at every `divisor`-th sample. Both columns go through the same zero-phase mean of `divisor` samples first,
+    /// which leaves the relation of one to the other as it is and takes away what the slower rate cannot show.
     #[must_use]
     pub fn slower(&self, divisor: usize) -> Self {
         if divisor <= 1 {

@@ -1,7 +1,7 @@
 //! From properties to gates, and from gates to a verdict.
 //!
-//! *in* properties, coverage, prediction; *out* [`Gates`], [`Verdict`]; *never* "will help" while a gate failed; *source* Zhou 2017,
-//! Insight 1b (stable inverse), Lemma 1 (unit gain), Section III (excitation).
+//! *in* properties, coverage, prediction; *out* [`Gates`], [`Verdict`]; *never* "will help" while a gate failed; *source* Zhou
+//! 2017, Insight 1b (stable inverse), Lemma 1 (unit gain), Section III (excitation).
 
 use serde::Serialize;
 
@@ -123,8 +123,8 @@ fn unit_gain(properties: &Properties) -> Gate {
 /// A zero further out than this is a dead time that is a tick longer, up to a tenth of the first coefficient: preview undoes it.
 pub const FAR: f64 = 10.0;
 
-/// Zeros that are judged: at frequencies that the record shows (at faster ones neither the log nor a smooth trajectory asks anything of the
-/// inverse) and not [`FAR`] out.
+/// Zeros that are judged: at frequencies that the record shows (at faster ones neither the log nor a smooth trajectory asks
+/// anything of the inverse) and not [`FAR`] out.
 pub fn judged_zeros<'a>(properties: &'a Properties, coverage: &Coverage) -> impl Iterator<Item = &'a Zero> + use<'a> {
     let highest = 1.02 * coverage.highest_hz;
     properties.zeros.iter().filter(move |zero| zero.frequency_hz <= highest && zero.magnitude.value < FAR)

@@ -3,8 +3,8 @@
 //! *in* [`demo::DemoSettings`]; *out* models and [`impromptu_report::Results`]; *never* a choice made on the test flights;
 //! *source* Zhou 2017, section V; Li 2017 (30 unseen strokes).
 //!
-//! How models come about is `impromptu-training`'s; how results look is `impromptu-report`'s, of which only the data are used here, so that
-//! whoever checks numbers needs no plotting.
+//! How models come about is `impromptu-training`'s; how results look is `impromptu-report`'s, of which only the data are used
+//! here, so that whoever checks numbers needs no plotting.
 //!
 //! | layer | modules | what they hold |
 //! |---|---|---|

@@ -1,7 +1,7 @@
 //! How the emulated board is reached: the kinds of link, and what each needs of the system.
 //!
-//! *in* the emulator's folder; *out* the emulator's option, then an open line; *never* a silent attempt on a system that has neither FIFOs
-//! nor Unix sockets.
+//! *in* the emulator's folder; *out* the emulator's option, then an open line; *never* a silent attempt on a system that has
+//! neither FIFOs nor Unix sockets.
 
 use std::{io, path::Path, time::Duration};
 

@@ -66,8 +66,8 @@ pub fn firmware() -> Result<PathBuf> {
     emulator::build_firmware("impromptu-board", "emulated", emulator::BOARD, &[])
 }
 
-/// Builds the firmware if need be, starts it with the bytes of a model file, or with none, and opens the line. `shift`: an instruction
-/// takes 2^shift nanoseconds.
+/// Builds the firmware if need be, starts it with the bytes of a model file, or with none, and opens the line. `shift`: an
+/// instruction takes 2^shift nanoseconds.
 ///
 /// # Errors
 /// If the target or the emulator is missing, with the line that installs it; if the firmware does not start.

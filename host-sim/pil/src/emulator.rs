@@ -66,10 +66,11 @@ impl Output {
     }
 }
 
-/// Builds the binary `bin` of a package with a profile ([`BOARD`], [`FIRMWARE`]), with additional variables in its environment, and gives the ELF file.
+/// Builds the binary `bin` of a package with a profile ([`BOARD`], [`FIRMWARE`]), with additional variables in its environment,
+/// and gives the ELF file.
 ///
-/// Once for each environment in a run of the tests. Cargo works in a target folder of its own, so that it neither waits for the build
-/// that runs the tests nor disturbs it.
+/// Once for each environment in a run of the tests. Cargo works in a target folder of its own, so that it neither waits for the
+/// build that runs the tests nor disturbs it.
 pub fn build_firmware(package: &str, bin: &str, profile: &str, environment: &[(&str, &str)]) -> Result<PathBuf> {
     build_firmware_of(workspace(), package, bin, profile, environment)
 }
@@ -141,7 +142,8 @@ pub fn run_with(further: &[&str], elf: &Path, working_dir: &Path, timeout: Durat
     Ok(Output { status, stdout, stderr })
 }
 
-/// The emulator as cargo would start it, but with further arguments, this virtual clock and this serial port; the ELF file comes next.
+/// The emulator as cargo would start it, but with further arguments, this virtual clock and this serial port; the ELF file comes
+/// next.
 pub fn command(further: &[&str], icount: &str, serial: &str) -> Result<Command> {
     let mut runner = runner()?;
     for (option, value) in [("-icount", icount), ("-serial", serial)] {

@@ -1,4 +1,5 @@
-//! Lines that lose, flip and invent bytes on their way to the firmware. What comes back is whole: the plant must get what the motors get.
+//! Lines that lose, flip and invent bytes on their way to the firmware. What comes back is whole: the plant must get what the
+//! motors get.
 
 use std::{io, ops::Range, time::Duration};
 

@@ -18,8 +18,8 @@ use crate::{
 /// Clock of the microcontroller, Hz.
 const CORE_HZ: f64 = 168e6;
 
-/// Cycles of an instruction on the microcontroller, 5 flash wait states, over whole control ticks and inferences: more than the cycle
-/// model has ever found (`tests/tests/processor.rs` measures it).
+/// Cycles of an instruction on the microcontroller, 5 flash wait states, over whole control ticks and inferences: more than the
+/// cycle model has ever found (`tests/tests/processor.rs` measures it).
 pub const CYCLES_PER_INSTRUCTION: f64 = 2.2;
 
 /// What `fly --pil` says of the microcontroller.
@@ -32,8 +32,8 @@ pub struct PilReport {
     #[serde(flatten)]
     /// What the firmware measured of itself.
     pub figures: Figures,
-    /// Share of the processor at 168 MHz and the flown rate, 0..1, if every tick were as expensive as the worst: instructions times
-    /// [`CYCLES_PER_INSTRUCTION`].
+    /// Share of the processor at 168 MHz and the flown rate, 0..1, if every tick were as expensive as the worst: instructions
+    /// times [`CYCLES_PER_INSTRUCTION`].
     pub cpu_share: f64,
     /// The same with control at 1 kHz.
     pub cpu_share_1khz: f64,

@@ -1,11 +1,11 @@
 //! Processor in the loop: the plant here, the flight stack in the binary that is flashed.
 //!
-//! *in* flight plans; *out* the flights that the microcontroller flew, and what it measured of itself; *never* another bit than the
-//! software's, if the link is perfect; *source* the link is `impromptu_flight::link`.
+//! *in* flight plans; *out* the flights that the microcontroller flew, and what it measured of itself; *never* another bit than
+//! the software's, if the link is perfect; *source* the link is `impromptu_flight::link`.
 //!
-//! At the bottom is what a link and an emulator are by themselves: lines of bytes, QEMU with the build of what it runs, the flash of a binary.
-//! A [`Board`] speaks the firmware's protocol over a line and is a flight stack like the software's; above it a model is uploaded, an
-//! emulated board started, and flights are flown with both and compared bit by bit.
+//! At the bottom is what a link and an emulator are by themselves: lines of bytes, QEMU with the build of what it runs, the flash
+//! of a binary. A [`Board`] speaks the firmware's protocol over a line and is a flight stack like the software's; above it a
+//! model is uploaded, an emulated board started, and flights are flown with both and compared bit by bit.
 //!
 //! | layer | modules | what they hold |
 //! |---|---|---|

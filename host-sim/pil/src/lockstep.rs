@@ -20,7 +20,8 @@ const FROM_FIRMWARE: &str = "from_firmware";
 /// Length of a batch that ends the flight.
 const END: u32 = u32::MAX;
 
-/// Makes the FIFOs of a lockstep line, by the program `mkfifo` of every POSIX system: macOS has no call for it that needs no `unsafe`.
+/// Makes the FIFOs of a lockstep line, by the program `mkfifo` of every POSIX system: macOS has no call for it that needs no
+/// `unsafe`.
 ///
 /// # Errors
 /// If the folder cannot hold them.

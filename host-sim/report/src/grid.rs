@@ -1,7 +1,7 @@
 //! Numbers of a section side by side: rows and columns of a table, as the findings' cells say.
 //!
-//! *in* findings of one section; *out* [`Grid`]s, in the order in which they were found; *never* a number in two tables, or in none if it has
-//! a cell; *source* none.
+//! *in* findings of one section; *out* [`Grid`]s, in the order in which they were found; *never* a number in two tables, or in
+//! none if it has a cell; *source* none.
 
 use crate::study::{Cell, Finding};
 

@@ -1,14 +1,16 @@
-//! Results and findings: data that a run fills, and their views: console table, JSON document, CSV and a self-contained HTML page.
+//! Results and findings: data that a run fills, and their views: console table, JSON document, CSV and a self-contained HTML
+//! page.
 //!
-//! - *in*: [`Results`], filled by an evaluation ([`summarise`] averages flights into its rows); a [`study::Study`], filled finding by finding.
-//! - *out*: their JSON, and with the feature `views` [`console_table`], [`write_table_csv`], [`write_flights_csv`], [`write_html`],
-//!   [`render_study`].
+//! - *in*: [`Results`], filled by an evaluation ([`summarise`] averages flights into its rows); a [`study::Study`], filled
+//!   finding by finding.
+//! - *out*: their JSON, and with the feature `views` [`console_table`], [`write_table_csv`], [`write_flights_csv`],
+//!   [`write_html`], [`render_study`].
 //! - *never*: hides a number that is not finite (it is shown as `n/a`), loads anything from elsewhere, or leaves half a file.
 //! - *source*: the error metric is that of Zhou, Helwa, Schoellig, CDC 2017, table I, and of its predecessor (Li et al.,
 //!   ICRA 2017): `sqrt(mean |p_d - p|²)` over the drawn part of a trajectory, and its reduction against the baseline.
 //!
-//! The data come first and know no view: whoever only produces or checks numbers needs no plotting. Above them are words and groups,
-//! then tables and plots, and the page over all.
+//! The data come first and know no view: whoever only produces or checks numbers needs no plotting. Above them are words and
+//! groups, then tables and plots, and the page over all.
 //!
 //! | layer | modules | what they hold |
 //! |---|---|---|

@@ -1,7 +1,7 @@
 //! What a study found: numbers, figures and paragraphs by section, beside what a paper states.
 //!
-//! *in* findings; *out* a [`Study`] that views show; *never* a number without a name, or one that the report shows and the JSON document
-//! lacks.
+//! *in* findings; *out* a [`Study`] that views show; *never* a number without a name, or one that the report shows and the JSON
+//! document lacks.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,10 +1,10 @@
 //! The paper, reproduced row by row: what was found, beside what the paper states.
 //!
-//! *in* settings and a seed; *out* an [`impromptu_report::study::Study`]: numbers and figures by name; *never* a number without a name;
-//! *source* Zhou, Helwa, Schoellig, CDC 2017, and the rows of its promises (1 to 31).
+//! *in* settings and a seed; *out* an [`impromptu_report::study::Study`]: numbers and figures by name; *never* a number without a
+//! name; *source* Zhou, Helwa, Schoellig, CDC 2017, and the rows of its promises (1 to 31).
 //!
-//! At the bottom are the paper's small single-input single-output loops, with laws, networks and the firmware's kernels on them. Each study
-//! above answers rows of the paper and knows none of the others.
+//! At the bottom are the paper's small single-input single-output loops, with laws, networks and the firmware's kernels on them.
+//! Each study above answers rows of the paper and knows none of the others.
 //!
 //! | layer | modules | what they hold |
 //! |---|---|---|

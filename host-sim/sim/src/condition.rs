@@ -3,8 +3,8 @@
 //! *in* a name or TOML; *out* numbers; *never* a delay for the loop that the add-on does not have too;
 //! *source* the three conditions of the project's pilot study, kept as data so that others can be added.
 //!
-//! The measurement delay is that of position and velocity (motion capture and radio); attitude and rates come from on board and are fresh:
-//! the Crazyflie's attitude loop (27° of phase margin with its 72 ms motors) would not bear it.
+//! The measurement delay is that of position and velocity (motion capture and radio); attitude and rates come from on board and
+//! are fresh: the Crazyflie's attitude loop (27° of phase margin with its 72 ms motors) would not bear it.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! Closed-loop flights: eight at once through the plant, each with the firmware's own flight stack.
 //!
-//! *in* [`FlightPlan`]s; *out* a [`FlightRecord`] each; *never* a result that depends on the order of the plans, on the other flights
-//! or on the number of threads; *source* Zhou 2017, Fig. 1; rates of `impromptu_flight::flight::Rates`.
+//! *in* [`FlightPlan`]s; *out* a [`FlightRecord`] each; *never* a result that depends on the order of the plans, on the other
+//! flights or on the number of threads; *source* Zhou 2017, Fig. 1; rates of `impromptu_flight::flight::Rates`.
 
 mod conversion;
 mod faults;

@@ -171,8 +171,8 @@ impl Diagnose {
         invocation.format.print(&diagnosed, || text(&diagnosed))
     }
 
-    /// How many logs are used, and their channels, those of one name joined. Flights in which the loop broke down are left out, as `train`
-    /// does; of other loops nobody knows the scale of their errors, so that such a log is only named.
+    /// How many logs are used, and their channels, those of one name joined. Flights in which the loop broke down are left out,
+    /// as `train` does; of other loops nobody knows the scale of their errors, so that such a log is only named.
     fn channels(&self, invocation: &Invocation) -> Result<(usize, Vec<Channel>)> {
         let age_s = self.delay_ms.unwrap_or(0.0) / 1e3;
         let columns = self.columns.as_ref().map(|columns| &columns.0);

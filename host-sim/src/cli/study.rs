@@ -64,7 +64,8 @@ struct Lti {
     /// Most steps of Levenberg-Marquardt.
     #[arg(long, default_value_t = lti::Settings::default().learning.training.iterations)]
     iterations: usize,
-    /// Folder of flight logs (CSV with px, py, sp_ctrltarget_x, sp_ctrltarget_y in m, every 40 ms; FAMILY_NUMBER_….csv) instead of those in the program.
+    /// Folder of flight logs (CSV with px, py, sp_ctrltarget_x, sp_ctrltarget_y in m, every 40 ms; FAMILY_NUMBER_….csv) instead
+    /// of those in the program.
     #[arg(long, value_name = "DIR")]
     logs: Option<std::path::PathBuf>,
 }

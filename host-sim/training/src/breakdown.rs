@@ -1,10 +1,12 @@
 //! Flights in which the loop broke down teach nothing of the loop that shall be corrected.
 //!
-//! *in* flight logs of the baseline; *out* the sound ones, and the names of the others; *never* fewer than half of the logs. Where motors saturate a quadrotor may tumble, and what it flies then is no answer to its reference.
+//! *in* flight logs of the baseline; *out* the sound ones, and the names of the others; *never* fewer than half of the logs.
+//! Where motors saturate a quadrotor may tumble, and what it flies then is no answer to its reference.
 
 use impromptu_sim::flight_log::FlightLog;
 
-/// Largest tracking error over the median log's at which a log counts as broken down. Saturated but recovered flights reach 3 times.
+/// Largest tracking error over the median log's at which a log counts as broken down. Saturated but recovered flights reach 3
+/// times.
 const FACTOR: f64 = 4.0;
 
 /// A log that is left out.

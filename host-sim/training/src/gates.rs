@@ -1,7 +1,7 @@
 //! The gates of a diagnosis before a training, axis by axis.
 //!
-//! *in* flight logs; *out* what each axis shows; *never* a failure of an axis on which nothing was asked; *source* Zhou 2017, Insight 1b,
-//! Lemma 1: stable inverse, gain of one for difference learning.
+//! *in* flight logs; *out* what each axis shows; *never* a failure of an axis on which nothing was asked; *source* Zhou 2017,
+//! Insight 1b, Lemma 1: stable inverse, gain of one for difference learning.
 
 use impromptu_diagnosis::{DiagnosisError, Gate, Gates, Settings, assess};
 use impromptu_sim::flight_log::FlightLog;
@@ -34,7 +34,8 @@ const LEAST_EXTENT: f64 = 0.2;
 /// Draws for the intervals of a gate.
 const DRAWS: usize = 100;
 
-/// The gates of every axis; logs in which the loop broke down do not count. `measurement_delay_s` is the age of what was measured.
+/// The gates of every axis; logs in which the loop broke down do not count. `measurement_delay_s` is the age of what was
+/// measured.
 pub fn check_gates(logs: &[FlightLog], measurement_delay_s: f64, seed: u64) -> Vec<AxisGates> {
     let (logs, _) = sound(logs);
     let settings = Settings { draws: DRAWS, seed, ..Settings::default() };

@@ -141,7 +141,8 @@ fn more_than_this_build_holds() {
     assert_eq!(Model::from_bytes(&assembled(&more, blob)).map(|_| ()).unwrap_err(), Refusal::Card);
 }
 
-/// The monitor's lists are one longer than this build holds: a card that cannot be decoded, whose refusal says what to do. They are made from a card with a full list by repeating an item.
+/// The monitor's lists are one longer than this build holds: a card that cannot be decoded, whose refusal says what to do. They
+/// are made from a card with a full list by repeating an item.
 #[test]
 fn more_of_the_monitor_than_this_build_holds() {
     let bytes = small_model(Precision::Int8);

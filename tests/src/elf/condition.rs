@@ -1,7 +1,7 @@
 //! Conditional instructions: IT blocks, and what writes the flags that they depend on.
 //!
-//! *in* halfwords; *out* the length and pattern of a block, and whether the flags may change; *never* an instruction that compares passes
-//! for one that does not; *source* Armv7-M Architecture Reference Manual (DDI 0403E), A7.7.38 and A7.3.
+//! *in* halfwords; *out* the length and pattern of a block, and whether the flags may change; *never* an instruction that
+//! compares passes for one that does not; *source* Armv7-M Architecture Reference Manual (DDI 0403E), A7.7.38 and A7.3.
 
 /// The instructions of an IT block that are still to come.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]

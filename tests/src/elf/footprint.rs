@@ -1,7 +1,7 @@
 //! How much memory a binary takes.
 //!
-//! *in* a binary, and the names of the statics that hold weights; *out* bytes of flash and RAM without them, and the largest pieces; *never*
-//! a section that is counted twice or not at all; *source* the ELF file's section flags.
+//! *in* a binary, and the names of the statics that hold weights; *out* bytes of flash and RAM without them, and the largest
+//! pieces; *never* a section that is counted twice or not at all; *source* the ELF file's section flags.
 
 use std::fmt::Write;
 
@@ -37,8 +37,8 @@ fn size(addresses: &std::ops::Range<u32>) -> u32 {
 }
 
 impl Elf {
-    /// Memory that the binary takes; `weights` are parts of the names of statics, or whole names of sections, that hold a model and do not
-    /// count.
+    /// Memory that the binary takes; `weights` are parts of the names of statics, or whole names of sections, that hold a model
+    /// and do not count.
     ///
     /// # Errors
     /// If there are no such weights.

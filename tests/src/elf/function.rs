@@ -1,7 +1,8 @@
 //! Walks one function along its flow.
 //!
-//! *in* an entry and the functions known not to return; *out* its calls, each with the depth of the stack at which it is made, and the
-//! deepest point; *never* a call that can be made is missing: what cannot be followed is a [`Flaw`]; *source* Armv7-M procedure calls.
+//! *in* an entry and the functions known not to return; *out* its calls, each with the depth of the stack at which it is made,
+//! and the deepest point; *never* a call that can be made is missing: what cannot be followed is a [`Flaw`]; *source* Armv7-M
+//! procedure calls.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -21,7 +22,8 @@ const LIMIT: i32 = 192 * 1024;
 pub enum Flaw {
     /// The stack pointer is set to a value that is not known, at this address.
     DynamicStack(u32),
-    /// The function returns at this address with another stack pointer than it was entered with, or goes above it, or below all memory.
+    /// The function returns at this address with another stack pointer than it was entered with, or goes above it, or below all
+    /// memory.
     Unbalanced(u32),
     /// What would be executed at this address is no instruction.
     NoCode(u32),
@@ -69,8 +71,8 @@ impl Block {
         if self.rest.count == 0 { Some(true) } else { self.holds.map(|holds| holds == (self.rest.alike & 1 != 0)) }
     }
 
-    /// The block after the instruction at hand. Right behind its end the condition is still known: a long conditional stretch is made of
-    /// several blocks.
+    /// The block after the instruction at hand. Right behind its end the condition is still known: a long conditional stretch is
+    /// made of several blocks.
     fn after(self, instruction: &Instruction) -> Self {
         if self.rest.count == 0 {
             return Self::default();
@@ -223,7 +225,8 @@ impl Walk<'_> {
         labels.into_iter().for_each(|label| self.visit((label, depth, Block::default())));
     }
 
-    /// The point behind a call. The compiler puts nothing behind one that never returns: there the function may end, or a literal lie.
+    /// The point behind a call. The compiler puts nothing behind one that never returns: there the function may end, or a literal
+    /// lie.
     fn come_back(&mut self, returns: bool, point: Point) {
         if returns && (self.start..self.end).contains(&point.0) && self.image.is_code(point.0) {
             self.visit(point);
@@ -254,8 +257,8 @@ impl Walk<'_> {
             };
             let target = at + 2 * u32::from(offset);
             let leaves = !(self.start..self.end).contains(&target) || !self.image.is_code(target);
-            // What fills a table up to the next word is no entry: zeros and NOPs, which as entries would lead nowhere, or what the
-            // compiler fills with, if the check before the jump says so.
+            // What fills a table up to the next word is no entry: zeros and NOPs, which as entries would lead nowhere, or what
+            // the compiler fills with, if the check before the jump says so.
             let fills = match (wide, offset) {
                 (true, 0 | 0xbf00 | 0xd4d4) | (false, 0) => leaves,
                 (false, 0xd4) => self.has_check(at, entry - at),

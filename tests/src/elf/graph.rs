@@ -1,7 +1,7 @@
 //! Which function calls which.
 //!
-//! *in* a binary, and where indirect calls may lead; *out* every function with its calls; *never* a call to a function that is not in
-//! the graph; *source* the functions as [`super::function`] walks them.
+//! *in* a binary, and where indirect calls may lead; *out* every function with its calls; *never* a call to a function that is
+//! not in the graph; *source* the functions as [`super::function`] walks them.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,7 +1,7 @@
 //! What an instruction of an Armv7E-M core does to the flow of a program and to its stack pointer, and nothing else about it.
 //!
-//! *in* halfwords and their address; *out* length, [`Flow`] and [`Stack`]; *never* an instruction that writes the stack pointer or the
-//! program counter passes for one that does not; *source* Armv7-M Architecture Reference Manual (DDI 0403E), chapter A5.
+//! *in* halfwords and their address; *out* length, [`Flow`] and [`Stack`]; *never* an instruction that writes the stack pointer
+//! or the program counter passes for one that does not; *source* Armv7-M Architecture Reference Manual (DDI 0403E), chapter A5.
 
 pub use super::condition::Condition;
 use super::condition::{compares, condition, sets_flags};
@@ -39,8 +39,8 @@ pub enum Flow {
         /// Whether the entries are halfwords.
         wide: bool,
     },
-    /// At the next instruction; from there on, as many instructions as this is long are conditional: true, if on the same condition
-    /// as the first of them, false, if on the opposite one.
+    /// At the next instruction; from there on, as many instructions as this is long are conditional: true, if on the same
+    /// condition as the first of them, false, if on the opposite one.
     Conditional(Condition),
     /// Nowhere: a permanently undefined instruction.
     Trap,
@@ -96,7 +96,8 @@ fn calculated(register: u16) -> Stack {
     if register == SP { Stack::Dynamic } else { Stack::Same }
 }
 
-/// Decodes the instruction at `address`, which starts with the halfword `first`; `second` is the halfword after that (0 at the end).
+/// Decodes the instruction at `address`, which starts with the halfword `first`; `second` is the halfword after that (0 at the
+/// end).
 pub fn decode(address: u32, first: u16, second: u16) -> Instruction {
     let length = if first >= 0xe800 { 4 } else { 2 };
     let (flow, stack) = if length == 2 { narrow(address, first) } else { wide(address, first, second) };

@@ -5,10 +5,10 @@
 //!          └────► Footprint: flash and RAM
 //! ```
 //!
-//! The instructions are decoded by [`instruction`], about 300 lines that know the flow and the stack pointer only. Of the decoders on
-//! the registry, `yaxpeax-arm` 0.5 knows no floating-point instruction (VPUSH is one), `unarm` no Thumb-2, and `capstone` needs a C
-//! compiler. Each function is walked along its flow ([`function`]), so tables and literals within it are never taken for code, and
-//! each call is known with the depth of the stack at which it is made.
+//! The instructions are decoded by [`instruction`], about 300 lines that know the flow and the stack pointer only. Of the
+//! decoders on the registry, `yaxpeax-arm` 0.5 knows no floating-point instruction (VPUSH is one), `unarm` no Thumb-2, and
+//! `capstone` needs a C compiler. Each function is walked along its flow ([`function`]), so tables and literals within it are
+//! never taken for code, and each call is known with the depth of the stack at which it is made.
 
 mod condition;
 pub mod footprint;
@@ -183,8 +183,8 @@ impl Elf {
         self.mapping.range(address..).find(|(_, code)| **code).map(|(end, _)| *end)
     }
 
-    /// Says that the functions with `name` in their names jump, where they jump to an address in a register, to labels of their own, whose
-    /// addresses are in tables between their instructions.
+    /// Says that the functions with `name` in their names jump, where they jump to an address in a register, to labels of their
+    /// own, whose addresses are in tables between their instructions.
     ///
     /// # Errors
     /// If there is no such function, or one has no such tables.

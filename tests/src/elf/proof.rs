@@ -1,8 +1,8 @@
 //! What the functions that a task can reach do.
 //!
-//! *in* the calls that can be reached from some roots; *out* panics, calculations in f64, allocations, recursion, indirect calls and the
-//! deepest stack, each with the chain of callers that leads there; *never* a bound of the stack beside an unknown one; *source* names in
-//! `core`, `alloc`, `compiler-builtins`, and the Run-time ABI for the Arm Architecture.
+//! *in* the calls that can be reached from some roots; *out* panics, calculations in f64, allocations, recursion, indirect calls
+//! and the deepest stack, each with the chain of callers that leads there; *never* a bound of the stack beside an unknown one;
+//! *source* names in `core`, `alloc`, `compiler-builtins`, and the Run-time ABI for the Arm Architecture.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -140,7 +140,8 @@ impl Proof<'_> {
         Ok(self.deepest()?.0)
     }
 
-    /// The path with the deepest stack: each function's name with the bytes of stack at its call of the next; the last with its frame.
+    /// The path with the deepest stack: each function's name with the bytes of stack at its call of the next; the last with its
+    /// frame.
     ///
     /// # Errors
     /// Those of [`Proof::stack_bytes`].

@@ -1,7 +1,7 @@
 //! What some roots reach in a graph of calls, and the stack that they need together.
 //!
-//! *in* names of roots, chains and interrupt handlers; *out* a [`Proof`] of what they reach, bytes of stack; *never* a bound where one of
-//! them has none; *source* the Armv7-M architecture for the frame of an exception.
+//! *in* names of roots, chains and interrupt handlers; *out* a [`Proof`] of what they reach, bytes of stack; *never* a bound
+//! where one of them has none; *source* the Armv7-M architecture for the frame of an exception.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -9,7 +9,8 @@ use anyhow::{Context, Result};
 
 use super::{graph::CallGraph, proof::Proof};
 
-/// What the core stacks for an exception while the floating-point unit is in use (26 words), and what it may add to align the frame.
+/// What the core stacks for an exception while the floating-point unit is in use (26 words), and what it may add to align the
+/// frame.
 pub const EXCEPTION_FRAME: u32 = 104 + 4;
 
 impl CallGraph<'_> {
@@ -21,8 +22,8 @@ impl CallGraph<'_> {
         self.from_roots_except(roots, &[])
     }
 
-    /// [`CallGraph::from_roots`], without what is called by the functions with `exceptions` in their names: what those reach is to be
-    /// told apart. They have no stack then, so [`Proof::stack_bytes`] is no bound.
+    /// [`CallGraph::from_roots`], without what is called by the functions with `exceptions` in their names: what those reach is
+    /// to be told apart. They have no stack then, so [`Proof::stack_bytes`] is no bound.
     ///
     /// # Errors
     /// If a root or an exception is not there.
@@ -43,8 +44,8 @@ impl CallGraph<'_> {
         Ok(Proof { graph: self, roots, callers })
     }
 
-    /// Most stack, bytes, along a chain of callers, each called by the one before it: from the entry of the first to the deepest point of
-    /// the last.
+    /// Most stack, bytes, along a chain of callers, each called by the one before it: from the entry of the first to the deepest
+    /// point of the last.
     ///
     /// # Errors
     /// If one of them does not call the next, or if the last one's stack has no bound ([`Proof::stack_bytes`]).
@@ -60,8 +61,9 @@ impl CallGraph<'_> {
         Ok(bytes)
     }
 
-    /// Most stack, bytes, of a program with interrupts: `thread` are its entries (`Reset`, `main`), `levels` the handlers of each priority in
-    /// use. A handler is interrupted by those of other levels only, so one of each can be active at a time, each with its exception frame.
+    /// Most stack, bytes, of a program with interrupts: `thread` are its entries (`Reset`, `main`), `levels` the handlers of each
+    /// priority in use. A handler is interrupted by those of other levels only, so one of each can be active at a time, each with
+    /// its exception frame.
     ///
     /// # Errors
     /// If one of them has no bound ([`Proof::stack_bytes`]).
@@ -69,8 +71,8 @@ impl CallGraph<'_> {
         self.nested_stack_bytes_except(thread, levels, &[])
     }
 
-    /// [`CallGraph::nested_stack_bytes`] without what is called by the functions with `exceptions` in their names, which have no stack then: those
-    /// that end the program, or have ended before the interrupts are on.
+    /// [`CallGraph::nested_stack_bytes`] without what is called by the functions with `exceptions` in their names, which have no
+    /// stack then: those that end the program, or have ended before the interrupts are on.
     ///
     /// # Errors
     /// If one of them has no bound, or an exception is not there.

@@ -95,8 +95,8 @@ impl Symbols {
 /// Flash that evaluations used, without the image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Needed {
-    /// Bytes of the functions that ran, each whole, and of the tables that were read, likewise. What has no name counts as far as it was
-    /// used.
+    /// Bytes of the functions that ran, each whole, and of the tables that were read, likewise. What has no name counts as far as
+    /// it was used.
     pub whole: u64,
     /// Bytes of the instructions that ran and of the tables that were read: a function may also serve other networks.
     pub path: u64,

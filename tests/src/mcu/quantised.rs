@@ -1,5 +1,5 @@
-//! Quantisation as TensorFlow Lite does it, which is what the other integer engines read: int8 codes with a zero point, one scale for each
-//! tensor, int32 bias, a 32-bit multiplier with a shift.
+//! Quantisation as TensorFlow Lite does it, which is what the other integer engines read: int8 codes with a zero point, one scale
+//! for each tensor, int32 bias, a 32-bit multiplier with a shift.
 
 use impromptu_model_export::{
     FloatNetwork,

@@ -1,7 +1,7 @@
 //! The file that defines what a path names.
 //!
-//! *in* a module and a path that it uses; *out* the defining file; *never* a file of another crate; *source* Rust's rules for paths, as far
-//! as they matter here: `crate`, `self`, `super`, modules, items, names that a `use` brings in.
+//! *in* a module and a path that it uses; *out* the defining file; *never* a file of another crate; *source* Rust's rules for
+//! paths, as far as they matter here: `crate`, `self`, `super`, modules, items, names that a `use` brings in.
 
 use super::module::Module;
 

@@ -1,9 +1,10 @@
 //! Loops made from a seed, whose relative degree, zeros, gain and noise are known.
 //!
-//! Classes in turn, by the index: minimum phase or not, gain one or not, relative degree 1 to 6. From the seed: two or three poles (real ones
-//! at 0.3 to 0.85, pairs of radius 0.4 to 0.8), a zero at -0.7 to 0.85, or outside: a real one at 1.04 to 1.6, or a pair of radius 1.06 to 1.4
-//! (which shows no reversal of a lone zero's kind); gains of 0.35 to 0.8 or 1.25 to 2.5, of either sign; white noise of 0.3 to 3 % and a slow
-//! disturbance of 0.2 to 2 % of the output's RMS; steps of random height held for 3 to 20 ticks, or twelve tones with a small dither.
+//! Classes in turn, by the index: minimum phase or not, gain one or not, relative degree 1 to 6. From the seed: two or three
+//! poles (real ones at 0.3 to 0.85, pairs of radius 0.4 to 0.8), a zero at -0.7 to 0.85, or outside: a real one at 1.04 to 1.6,
+//! or a pair of radius 1.06 to 1.4 (which shows no reversal of a lone zero's kind); gains of 0.35 to 0.8 or 1.25 to 2.5, of
+//! either sign; white noise of 0.3 to 3 % and a slow disturbance of 0.2 to 2 % of the output's RMS; steps of random height held
+//! for 3 to 20 ticks, or twelve tones with a small dither.
 
 use impromptu_diagnosis::{Record, transfer_function::TransferFunction};
 use rand::{RngExt as _, SeedableRng as _};

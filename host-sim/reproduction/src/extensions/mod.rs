@@ -1,7 +1,7 @@
 //! Rows 5, 11 and 31, and real logs: what the paper names without showing it, or leaves to later work.
 //!
-//! *in* a study, a seed, perhaps a folder of logs; *out* its numbers and figures; *never* a mean without the worst beside it; *source*
-//! [`crate::siso::extensions`].
+//! *in* a study, a seed, perhaps a folder of logs; *out* its numbers and figures; *never* a mean without the worst beside it;
+//! *source* [`crate::siso::extensions`].
 
 mod logs;
 mod nonlinear;

@@ -1,8 +1,9 @@
 //! Lemma 1: difference learning on loops of unit and of other DC gain.
 //!
-//! *in* a loop with y = x₁ and x₂ = 0 in steady state, of three DC gains; *out* rows 14 to 16; *never* a prediction from the run that it
-//! predicts: it follows from the network and K₀ alone; *source* Zhou 2017, section III-C: y_ss = K₀ (K + b), b being the network's output for
-//! inputs that are all zero. In training y(t) stands where y_d(t) stands in flight, so x₁ - y_d is always zero there and is not learned.
+//! *in* a loop with y = x₁ and x₂ = 0 in steady state, of three DC gains; *out* rows 14 to 16; *never* a prediction from the run
+//! that it predicts: it follows from the network and K₀ alone; *source* Zhou 2017, section III-C: y_ss = K₀ (K + b), b being the
+//! network's output for inputs that are all zero. In training y(t) stands where y_d(t) stands in flight, so x₁ - y_d is always
+//! zero there and is not learned.
 
 use crate::siso::{
     FeatureSet, Learned, Plant, Start, fixtures::position_and_difference, learn, learning::Settings, levenberg_marquardt,

@@ -1,7 +1,7 @@
 //! Relative degree, zeros, gain, and the exact laws in two precisions.
 //!
-//! *in* the paper's systems; *out* rows 3, 4, 6, 8, 12 and 17; *never* more samples than the error needs to show; *source* Zhou 2017,
-//! equations (4), (9), (10) and the transfer-function law.
+//! *in* the paper's systems; *out* rows 3, 4, 6, 8, 12 and 17; *never* more samples than the error needs to show; *source* Zhou
+//! 2017, equations (4), (9), (10) and the transfer-function law.
 
 use impromptu_report::study::{Finding, Study};
 

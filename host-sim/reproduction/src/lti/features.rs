@@ -1,6 +1,7 @@
 //! What state features buy: initial errors and disturbances, beside transfer-function features.
 //!
-//! *in* S1 and its two networks; *out* row 13; *never* a module that sees the disturbance; *source* Zhou 2017, end of section III-B.
+//! *in* S1 and its two networks; *out* row 13; *never* a module that sees the disturbance; *source* Zhou 2017, end of section
+//! III-B.
 
 use impromptu_report::study::{Finding, Study};
 

@@ -1,7 +1,7 @@
 //! The 3-20-20-1 network in front of both systems, in f64 and as the firmware evaluates it.
 //!
-//! *in* both systems and both feature sets; *out* rows 7, 18 and 19, and figures 2a and 2b; *never* another test than the paper's;
-//! *source* Zhou 2017, section V.
+//! *in* both systems and both feature sets; *out* rows 7, 18 and 19, and figures 2a and 2b; *never* another test than the
+//! paper's; *source* Zhou 2017, section V.
 
 use crate::siso::{
     Assessment, FeatureSet, FirmwareModule, Learned, Module, Moment, Plant, Start, assess,

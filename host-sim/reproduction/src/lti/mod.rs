@@ -1,7 +1,7 @@
 //! Insight 1, the two feature sets and Lemma 1 on the paper's linear systems.
 //!
-//! *in* settings and a seed; *out* rows 3, 4, 6 to 10 and 12 to 19 as numbers and figures; *never* a choice made on the test trajectory;
-//! *source* Zhou 2017, sections III and V.
+//! *in* settings and a seed; *out* rows 3, 4, 6 to 10 and 12 to 19 as numbers and figures; *never* a choice made on the test
+//! trajectory; *source* Zhou 2017, sections III and V.
 
 mod difference;
 mod exact;

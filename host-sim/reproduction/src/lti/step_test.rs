@@ -1,7 +1,8 @@
 //! What a step test tells before anything is trained: the gates of Insight 1b.
 //!
-//! *in* the paper's systems, driven by steps of random height, with noise; *out* rows 8 to 10; *never* a property that is read from the model
-//! instead of the log; *source* Zhou 2017, section III; row 10: an even number of unstable zeros shows no reversal, hence identified zeros.
+//! *in* the paper's systems, driven by steps of random height, with noise; *out* rows 8 to 10; *never* a property that is read
+//! from the model instead of the log; *source* Zhou 2017, section III; row 10: an even number of unstable zeros shows no
+//! reversal, hence identified zeros.
 
 use crate::siso::{Plant as _, fixtures::PERIOD};
 use anyhow::Context as _;

@@ -1,6 +1,8 @@
-//! The Crazyflie's part of the study: clean and in the lab, trained on strokes of other seeds, with the window of desired positions.
+//! The Crazyflie's part of the study: clean and in the lab, trained on strokes of other seeds, with the window of desired
+//! positions.
 //!
-//! *in* settings; *out* loops, logs, recipe and the flights by which sweeps are judged; *never* a test stroke among them; *source* this project's pilot.
+//! *in* settings; *out* loops, logs, recipe and the flights by which sweeps are judged; *never* a test stroke among them;
+//! *source* this project's pilot.
 
 use impromptu_firmware::model::Interpolation;
 use impromptu_sim::{

@@ -1,6 +1,7 @@
 //! A flight stack whose vertical reference is multiplied by 0.5 behind the add-on: a baseline with a DC gain of 0.5 in z.
 //!
-//! *in* and *out* those of the firmware's flight stack, which flies inside; *never* another loop than the firmware's; *source* Zhou 2017, Fig. 4.
+//! *in* and *out* those of the firmware's flight stack, which flies inside; *never* another loop than the firmware's; *source*
+//! Zhou 2017, Fig. 4.
 
 use impromptu_firmware::{
     AddOn,

@@ -1,8 +1,8 @@
 //! The paper's two lists of network inputs, as data.
 //!
-//! *in* the origin of differences; *out* a list of [`Feature`]s; *never* other than 12 or 36; *source* Zhou 2017, section V-B. What differs: desired
-//! angles and body rates are not stored with a trajectory; in their places stand the desired accelerations which they follow from
-//! (flatness), now and one tick later, and the heading.
+//! *in* the origin of differences; *out* a list of [`Feature`]s; *never* other than 12 or 36; *source* Zhou 2017, section V-B.
+//! What differs: desired angles and body rates are not stored with a trajectory; in their places stand the desired accelerations
+//! which they follow from (flatness), now and one tick later, and the heading.
 
 use impromptu_firmware::features::{Feature, Relative, Source};
 

@@ -1,6 +1,7 @@
 //! The quadrotor study: Insights 2 and 3 on the predecessor's loop and on a Crazyflie.
 //!
-//! *in* [`QuadrotorSettings`]; *out* a [`Study`]; *never* a choice made on the test trajectories; *source* Zhou 2017, section V; Li et al., ICRA 2017.
+//! *in* [`QuadrotorSettings`]; *out* a [`Study`]; *never* a choice made on the test trajectories; *source* Zhou 2017, section V;
+//! Li et al., ICRA 2017.
 
 pub mod addon;
 mod bias;

@@ -1,7 +1,8 @@
 //! The predecessor's loop: its vehicle, gains, rates and link.
 //!
-//! *in* nothing; *out* a [`Loop`] at 66.7 Hz whose commands are 100 ms late; *never* noise or wind; *source* Li et al., ICRA 2017. What differs:
-//! the vertical loop commands an acceleration, not a velocity, as the nonlinear transformation does in the plane; no limit of the tilt.
+//! *in* nothing; *out* a [`Loop`] at 66.7 Hz whose commands are 100 ms late; *never* noise or wind; *source* Li et al., ICRA
+//! 2017. What differs: the vertical loop commands an acceleration, not a velocity, as the nonlinear transformation does in the
+//!       plane; no limit of the tilt.
 
 use impromptu_firmware::guard::GuardSettings;
 use impromptu_flight::flight::Rates;

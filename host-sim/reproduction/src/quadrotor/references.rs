@@ -1,7 +1,9 @@
-//! Methods that need no model file: shifted references and iterative learning. The baseline flies references that differ from what is desired.
+//! Methods that need no model file: shifted references and iterative learning. The baseline flies references that differ from
+//! what is desired.
 //!
-//! *in* trajectories; *out* RMS errors; *never* the true state for learning: trials learn from what was measured; *source* Bristow, Tharayil and Alleyne,
-//! "A survey of iterative learning control" (2006): u_{k+1}(t) = Q(u_k(t) + gain e_k(t + delay)), Q a zero-phase filter.
+//! *in* trajectories; *out* RMS errors; *never* the true state for learning: trials learn from what was measured; *source*
+//! Bristow, Tharayil and Alleyne, "A survey of iterative learning control" (2006): u_{k+1}(t) = Q(u_k(t) + gain e_k(t + delay)),
+//! Q a zero-phase filter.
 
 use impromptu_sim::{
     flight_log::FlightLog,

@@ -1,7 +1,7 @@
 //! One set of trajectories flown three times: without the add-on, with the network lane alone, with both lanes.
 //!
-//! *in* a loop, a model, trajectories; *out* errors and trips of the guard; *never* a baseline that flew another vehicle or another air
-//! than the add-on; *source* Zhou 2017, Table I (reduction of the RMS error).
+//! *in* a loop, a model, trajectories; *out* errors and trips of the guard; *never* a baseline that flew another vehicle or
+//! another air than the add-on; *source* Zhou 2017, Table I (reduction of the RMS error).
 
 use impromptu_firmware::{
     adapter::Lanes,

@@ -35,8 +35,8 @@ pub struct Ranges {
 }
 
 impl Default for Ranges {
-    /// What a builder of small vehicles does not know better: a battery or a deck of a tenth of the mass, a battery between full and
-    /// nearly empty, other propellers, a link that is at most 20 ms later, moving air indoors.
+    /// What a builder of small vehicles does not know better: a battery or a deck of a tenth of the mass, a battery between full
+    /// and nearly empty, other propellers, a link that is at most 20 ms later, moving air indoors.
     fn default() -> Self {
         Self {
             mass: [0.95, 1.15],
@@ -148,8 +148,8 @@ pub struct Draw {
 }
 
 impl Draw {
-    /// Reductions of the draw's flights with the given errors, per cent; a flight that left the numbers counts -100 %, or nothing where
-    /// the baseline did so too.
+    /// Reductions of the draw's flights with the given errors, per cent; a flight that left the numbers counts -100 %, or nothing
+    /// where the baseline did so too.
     pub fn reductions(&self, errors: &[Option<f64>]) -> Vec<f64> {
         let flights = self.baseline.iter().zip(errors);
         flights

@@ -1,7 +1,8 @@
 //! Monte Carlo over vehicles: each draw is another vehicle in another air, flown with the model of the nominal one.
 //!
-//! *in* a loop, a model, ranges, a seed; *out* a [`Draw`] for each number; *never* a draw that depends on other draws, on the shard or on the
-//! number of threads; *source* Tempo, Calafiore, Dabbene, "Randomized Algorithms for Analysis and Control of Uncertain Systems" (2013).
+//! *in* a loop, a model, ranges, a seed; *out* a [`Draw`] for each number; *never* a draw that depends on other draws, on the
+//! shard or on the number of threads; *source* Tempo, Calafiore, Dabbene, "Randomized Algorithms for Analysis and Control of
+//! Uncertain Systems" (2013).
 
 use std::path::Path;
 
@@ -35,7 +36,8 @@ pub enum DrawsError {
     Ledger(#[from] LedgerError),
 }
 
-/// Flies the draws of a shard that `path` does not hold yet, writes them there as they are done, and returns all that it holds then.
+/// Flies the draws of a shard that `path` does not hold yet, writes them there as they are done, and returns all that it holds
+/// then.
 ///
 /// # Errors
 /// If the file is of other settings or damaged, or if something cannot be flown.

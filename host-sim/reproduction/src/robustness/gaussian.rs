@@ -1,8 +1,8 @@
 //! The linear-quadratic-Gaussian limit: the least error that any feedback on the reference could leave at hover.
 //!
-//! *in* an axis of the loop at hover, the control weight; *out* the variance of the true position error; *never* a gain or a filter whose closed loop
-//! is unstable; *source* Åström and Wittenmark, Computer-Controlled Systems, chapter 11: linear-quadratic regulator, Kalman filter that uses
-//! the newest measurement, Lyapunov equation of both together.
+//! *in* an axis of the loop at hover, the control weight; *out* the variance of the true position error; *never* a gain or a
+//! filter whose closed loop is unstable; *source* Åström and Wittenmark, Computer-Controlled Systems, chapter 11:
+//! linear-quadratic regulator, Kalman filter that uses the newest measurement, Lyapunov equation of both together.
 
 use impromptu_training::feedback_design::riccati;
 use nalgebra::{DMatrix, DVector, Matrix2, RowDVector};
@@ -84,7 +84,8 @@ fn filter(axis: &HoverAxis) -> Option<DMatrix<f64>> {
     None
 }
 
-/// The limit at a control weight (weight on r², per m², beside 1 on the square of the position error); nothing if the equations have no solution.
+/// The limit at a control weight (weight on r², per m², beside 1 on the square of the position error); nothing if the equations
+/// have no solution.
 pub fn limit(axis: &HoverAxis, control_weight: f64) -> Option<Limit> {
     let size = axis.dynamics.nrows();
     let mut weight = DMatrix::zeros(size, size);
@@ -118,7 +119,8 @@ pub fn limit(axis: &HoverAxis, control_weight: f64) -> Option<Limit> {
     Some(Limit { variance: covariance[(POSITION, POSITION)], mean_square_control, gain, filter })
 }
 
-/// Mean square of the position error over so many simulated ticks under the limit's regulator, m², with random numbers from `seed`.
+/// Mean square of the position error over so many simulated ticks under the limit's regulator, m², with random numbers from
+/// `seed`.
 pub fn simulated_variance(axis: &HoverAxis, limit: &Limit, ticks: usize, seed: u64) -> f64 {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let size = axis.dynamics.nrows();

@@ -1,7 +1,8 @@
 //! The simulated closed position loop at hover, along one axis, as a linear system from one reference tick to the next.
 //!
-//! *in* a loop; *out* matrices of the state (plant, past measurements on their way, disturbance); *never* an equation of the vehicle or of its
-//! controller written down again: plant and flight stack are differentiated as they are; *source* central differences.
+//! *in* a loop; *out* matrices of the state (plant, past measurements on their way, disturbance); *never* an equation of the
+//! vehicle or of its controller written down again: plant and flight stack are differentiated as they are; *source* central
+//! differences.
 
 use std::array;
 
@@ -16,8 +17,8 @@ use impromptu_sim::{
 };
 use nalgebra::{DMatrix, DVector};
 
-/// One axis of the loop, in deviations from hover. With r the correction of the position reference (m) and y the position (m) and velocity
-/// (m/s) as the loop and the add-on receive them at the same tick:
+/// One axis of the loop, in deviations from hover. With r the correction of the position reference (m) and y the position (m) and
+/// velocity (m/s) as the loop and the add-on receive them at the same tick:
 ///
 /// `x(k+1) = dynamics x(k) + input r(k) + from_measurement y(k) + w(k)`, `y(k) = measurement x(k) + n(k)`.
 #[derive(Clone, Debug)]
@@ -41,8 +42,8 @@ pub const POSITION: usize = 0;
 const VELOCITY: usize = 1;
 /// Rotors.
 const ROTORS: usize = 4;
-/// Half steps of the differences: 1 cm, 1 cm/s, 5 mrad (half of a rotation by 10 mrad), 0.02 rad/s, 1 rad/s: large against f32, small against
-/// a radian.
+/// Half steps of the differences: 1 cm, 1 cm/s, 5 mrad (half of a rotation by 10 mrad), 0.02 rad/s, 1 rad/s: large against f32,
+/// small against a radian.
 const STEPS: [f64; 5] = [0.01, 0.01, 0.005, 0.02, 1.0];
 
 /// The components of a state that move along an axis: position, velocity, quaternion and rate about the axis that tilts, rotors.
@@ -124,7 +125,8 @@ impl Hover<'_> {
     }
 }
 
-/// Linearises the closed position loop of `closed_loop` along an axis (0, 1, 2: x, y, z). The delay of commands is not part of it.
+/// Linearises the closed position loop of `closed_loop` along an axis (0, 1, 2: x, y, z). The delay of commands is not part of
+/// it.
 ///
 /// # Errors
 /// If the vehicle cannot be flown.

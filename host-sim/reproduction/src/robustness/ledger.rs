@@ -1,7 +1,7 @@
 //! The file of a Monte Carlo run: a header and a line for each draw, as JSON.
 //!
-//! *in* draws as they are flown, files of shards; *out* a file that a later run goes on with, and one file of all shards; *never* draws of
-//! different settings or seeds in one file, and merged shards differ in no byte from a single run; *source* JSON Lines.
+//! *in* draws as they are flown, files of shards; *out* a file that a later run goes on with, and one file of all shards; *never*
+//! draws of different settings or seeds in one file, and merged shards differ in no byte from a single run; *source* JSON Lines.
 
 mod error;
 

@@ -1,7 +1,7 @@
 //! A vehicle and an air that differ from what a model was made for, at test time only.
 //!
-//! *in* a loop and a [`Mismatch`]; *out* the loop that is flown; *never* a flight stack that knows of it: mass, thrust and gains in its
-//! settings stay those of the vehicle's data; *source* facts of the pilot study, "at test time only".
+//! *in* a loop and a [`Mismatch`]; *out* the loop that is flown; *never* a flight stack that knows of it: mass, thrust and gains
+//! in its settings stay those of the vehicle's data; *source* facts of the pilot study, "at test time only".
 
 use impromptu_sim::{flights::Loop, weather::Dryden};
 use serde::{Deserialize, Serialize};

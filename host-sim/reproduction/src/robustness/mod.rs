@@ -1,7 +1,7 @@
 //! Robustness: what is left of the gain when vehicle, loop and air are not those of the training, and what it costs to keep it.
 //!
-//! *in* settings; *out* a [`Study`]; *never* a model or a lane that was chosen on the flights that are shown here; *source* Zhou 2017
-//! section V (a vehicle and its model) and the pilot study, "at test time only".
+//! *in* settings; *out* a [`Study`]; *never* a model or a lane that was chosen on the flights that are shown here; *source* Zhou
+//! 2017 section V (a vehicle and its model) and the pilot study, "at test time only".
 
 mod cases;
 mod comparison;

@@ -1,8 +1,8 @@
 //! The network as the microcontroller evaluates it.
 //!
-//! *in* a [`Network`], its features and training rows; *out* the firmware's model file and a module that runs the firmware's kernels on it;
-//! *never* arithmetic of its own: features are rounded to f32, the rest is `Network::evaluate` of the firmware; *source* none: the paper's
-//! networks ran off-board.
+//! *in* a [`Network`], its features and training rows; *out* the firmware's model file and a module that runs the firmware's
+//! kernels on it; *never* arithmetic of its own: features are rounded to f32, the rest is `Network::evaluate` of the firmware;
+//! *source* none: the paper's networks ran off-board.
 
 use impromptu_firmware::{
     model::{Interpolation, Model, Output, Refusal},

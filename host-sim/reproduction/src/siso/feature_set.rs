@@ -1,7 +1,7 @@
 //! Inputs and output of the module, as data: the firmware's features, evaluated in any float.
 //!
-//! *in* a list of firmware [`Feature`]s and a [`Moment`]; *out* one number each; *never* another meaning than the firmware's: in f32 both
-//! evaluators give the same bits; *source* Zhou 2017, Insight 2 (two feature sets) and Insight 3 (difference learning).
+//! *in* a list of firmware [`Feature`]s and a [`Moment`]; *out* one number each; *never* another meaning than the firmware's: in
+//! f32 both evaluators give the same bits; *source* Zhou 2017, Insight 2 (two feature sets) and Insight 3 (difference learning).
 //!
 //! Signals: desired channel 0 is y_d, measured channels are the states, reference channel 0 is u; offsets are samples.
 

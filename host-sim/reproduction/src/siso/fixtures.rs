@@ -21,8 +21,8 @@ pub fn non_minimum_phase() -> StateSpace {
     system(&[0.0, 1.0, -0.15, 0.8], &[0.0, 1.0], &[-450.9, 450.0])
 }
 
-/// Poles of [`minimum_phase`] and a DC gain of choice in the coordinates of Lemma 1: x₁ = y, and x₂ = y(t+1) - y(t) is zero in steady state.
-/// The relative degree is 2.
+/// Poles of [`minimum_phase`] and a DC gain of choice in the coordinates of Lemma 1: x₁ = y, and x₂ = y(t+1) - y(t) is zero in
+/// steady state. The relative degree is 2.
 pub fn position_and_difference(dc_gain: f64) -> StateSpace {
     // y(t+2) = 0.8 y(t+1) - 0.15 y(t) + 0.35 K₀ u(t), with y(t+1) = x₁ + x₂.
     system(&[1.0, 1.0, -0.35, -0.2], &[0.0, 0.35 * dc_gain], &[1.0, 0.0])

@@ -1,8 +1,8 @@
 //! A closed loop as it looks from outside: a delay and a second-order lag, identified from its log.
 //!
-//! *in* reference and output, evenly sampled; *out* five parameters, and the output of other references; *never* a step of the search that
-//! fits worse; *source* output-error identification (Ljung, System Identification, 1999): the model runs freely beside the log, it is not
-//! corrected by it at every sample, for that is how it is used afterwards.
+//! *in* reference and output, evenly sampled; *out* five parameters, and the output of other references; *never* a step of the
+//! search that fits worse; *source* output-error identification (Ljung, System Identification, 1999): the model runs freely
+//! beside the log, it is not corrected by it at every sample, for that is how it is used afterwards.
 
 use nalgebra::{DMatrix, DVector};
 

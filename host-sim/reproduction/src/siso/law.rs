@@ -1,7 +1,7 @@
 //! The exact laws that a network should learn.
 //!
-//! *in* a linear system; *out* modules that give y(t+r) = y_d(t+r); *never* a division by zero: a [`StateSpace`] has c A^(r-1) b ≠ 0;
-//! *source* Zhou 2017, equations (4) and (9): state-space and transfer-function law, in f32 or f64.
+//! *in* a linear system; *out* modules that give y(t+r) = y_d(t+r); *never* a division by zero: a [`StateSpace`] has c A^(r-1) b
+//! ≠ 0; *source* Zhou 2017, equations (4) and (9): state-space and transfer-function law, in f32 or f64.
 
 use impromptu_diagnosis::transfer_function::TransferFunction;
 use nalgebra::RowDVector;

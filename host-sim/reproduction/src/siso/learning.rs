@@ -1,8 +1,8 @@
 //! From a plant to a module that flies, and how good it is.
 //!
-//! *in* a plant, features, settings; *out* a [`Learned`] network with its model files, and an [`Assessment`] of a module in the loop;
-//! *never* a choice by the test trajectory: among restarts the f32 kernel's error on other samples of the tones decides; *source* Zhou 2017,
-//! section V.
+//! *in* a plant, features, settings; *out* a [`Learned`] network with its model files, and an [`Assessment`] of a module in the
+//! loop; *never* a choice by the test trajectory: among restarts the f32 kernel's error on other samples of the tones decides;
+//! *source* Zhou 2017, section V.
 
 use impromptu_model_export::{ExportError, Precision};
 use rayon::prelude::*;

@@ -1,9 +1,10 @@
 //! Training by Levenberg-Marquardt with variable projection.
 //!
-//! *in* rows, settings, a seed; *out* a [`Fit`]; *never* a step that makes the training error larger; *source* Zhou 2017, section V-A
-//! (Levenberg-Marquardt, < 1000 iterations). Differs: the linear output layer is not a parameter but solved for at every step (Golub and
-//! Pereyra 1973, with Kaufman's approximation of the Jacobian), which converges in a tenth of the steps.
-//! The crate `varpro` asks for one matrix for each of the 500 derivatives, `levenberg-marquardt` decomposes the whole Jacobian at each step.
+//! *in* rows, settings, a seed; *out* a [`Fit`]; *never* a step that makes the training error larger; *source* Zhou 2017, section
+//! V-A (Levenberg-Marquardt, < 1000 iterations). Differs: the linear output layer is not a parameter but solved for at every step
+//! (Golub and Pereyra 1973, with Kaufman's approximation of the Jacobian), which converges in a tenth of the steps.
+//! The crate `varpro` asks for one matrix for each of the 500 derivatives, `levenberg-marquardt` decomposes the whole Jacobian at
+//! each step.
 
 use impromptu_diagnosis::cholesky::Factor;
 use nalgebra::{DMatrix, DVector};
@@ -26,11 +27,11 @@ pub struct Settings {
     pub iterations: usize,
     /// It has converged when so many steps together take less than a tenth off the error.
     pub patience: usize,
-    /// Standard deviation of the initial pre-activations for inputs of 1. Small ones leave the network nearly linear and the output
-    /// weights large, which costs digits in f32.
+    /// Standard deviation of the initial pre-activations for inputs of 1. Small ones leave the network nearly linear and the
+    /// output weights large, which costs digits in f32.
     pub initial: f64,
-    /// Weight of the squared output weights beside the mean squared error. Too small, and f64 gains digits that f32 loses to large
-    /// weights.
+    /// Weight of the squared output weights beside the mean squared error. Too small, and f64 gains digits that f32 loses to
+    /// large weights.
     pub ridge: f64,
 }
 

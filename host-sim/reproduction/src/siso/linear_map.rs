@@ -1,6 +1,7 @@
 //! Ridge regression on the rows that the network learns from: the map which it has to beat.
 //!
-//! *in* rows and a penalty; *out* weights and an intercept; *never* a fit of rows that do not determine it; *source* Hoerl and Kennard 1970.
+//! *in* rows and a penalty; *out* weights and an intercept; *never* a fit of rows that do not determine it; *source* Hoerl and
+//! Kennard 1970.
 
 use impromptu_diagnosis::{cholesky::Factor, least_squares::Regression};
 use nalgebra::{DMatrix, DVector};
@@ -17,8 +18,8 @@ pub struct LinearMap {
 }
 
 impl LinearMap {
-    /// The map with the least mean squared error; `penalty` is relative to the mean variance of the features. `None` if the rows do not
-    /// determine it.
+    /// The map with the least mean squared error; `penalty` is relative to the mean variance of the features. `None` if the rows
+    /// do not determine it.
     pub fn fit(rows: &Rows, penalty: f64) -> Option<Self> {
         let (inputs, targets) = (&rows.inputs, &rows.targets);
         let means = DVector::from_iterator(inputs.ncols(), inputs.column_iter().map(|column| column.mean()));

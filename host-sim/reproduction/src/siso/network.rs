@@ -1,7 +1,7 @@
 //! A tanh network of two hidden layers and one output, in f64.
 //!
-//! *in* features; *out* one number; *never* another scaling in training than in flight: it is part of the network; *source* Zhou 2017,
-//! section V-A (3-20-20-1). Inputs and output are scaled to within ±1 over the training rows.
+//! *in* features; *out* one number; *never* another scaling in training than in flight: it is part of the network; *source* Zhou
+//! 2017, section V-A (3-20-20-1). Inputs and output are scaled to within ±1 over the training rows.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -1,7 +1,8 @@
 //! Plants that are no linear system: one whose exact law is known, and one whose relative degree and gain depend on the region.
 //!
-//! *in* a state and a reference; *out* the next state; *never* a gain D(x) of zero inside of a region; *source* Zhou 2017, equations (2), (6)
-//! and (7): y(t+r) = ĥ(x) + D(x) u(t) gives u = (y_d(t+r) - ĥ(x)) / D(x). The plants are ours; the paper shows none.
+//! *in* a state and a reference; *out* the next state; *never* a gain D(x) of zero inside of a region; *source* Zhou 2017,
+//! equations (2), (6) and (7): y(t+r) = ĥ(x) + D(x) u(t) gives u = (y_d(t+r) - ĥ(x)) / D(x). The plants are ours; the paper shows
+//! none.
 
 use crate::siso::{Module, Moment, Plant};
 
@@ -46,8 +47,8 @@ impl Module<f64> for InputAffine {
     }
 }
 
-/// Below [`TwoRegions::BORDER`] the reference acts at once (r = 1, DC gain 1), above it through a delay and with more gain (r = 2, DC gain
-/// 1.6); within ±[`TwoRegions::HALF_WIDTH`] of the border one becomes the other.
+/// Below [`TwoRegions::BORDER`] the reference acts at once (r = 1, DC gain 1), above it through a delay and with more gain (r =
+/// 2, DC gain 1.6); within ±[`TwoRegions::HALF_WIDTH`] of the border one becomes the other.
 ///
 /// y⁺ = 0.7 y + 0.3 ((1 - s) u + 1.6 s w), w⁺ = u, s from 0 to 1.
 #[derive(Clone, Copy, Debug, Default)]

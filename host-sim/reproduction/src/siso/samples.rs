@@ -1,8 +1,9 @@
 //! Training rows from the baseline loop under tones.
 //!
-//! *in* a plant, tones, a feature set, a seed; *out* [`Rows`]: features and target of randomly chosen samples, as many of each tone;
-//! *never* a sample of which a feature would look beyond the run; *source* Zhou 2017, section V-A (balanced number of randomly chosen points
-//! from each trajectory). The actual output y(t+k) stands where the desired one, y_d(t+k), stands in flight.
+//! *in* a plant, tones, a feature set, a seed; *out* [`Rows`]: features and target of randomly chosen samples, as many of each
+//! tone; *never* a sample of which a feature would look beyond the run; *source* Zhou 2017, section V-A (balanced number of
+//! randomly chosen points from each trajectory). The actual output y(t+k) stands where the desired one, y_d(t+k), stands in
+//! flight.
 
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};

@@ -1,7 +1,7 @@
 //! Training signals: 25 sinusoids.
 //!
-//! *in* the sampling period; *out* references, sample by sample; *never* a tone above half of the sampling rate, where it would be
-//! another one; *source* Zhou 2017, section V-A: amplitudes 1 to 5 and five frequencies, every combination.
+//! *in* the sampling period; *out* references, sample by sample; *never* a tone above half of the sampling rate, where it would
+//! be another one; *source* Zhou 2017, section V-A: amplitudes 1 to 5 and five frequencies, every combination.
 
 use serde::{Deserialize, Serialize};
 

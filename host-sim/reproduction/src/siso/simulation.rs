@@ -1,7 +1,7 @@
 //! A loop with a module in front of it, sample by sample.
 //!
-//! *in* a plant, a module, the desired output; *out* a [`Run`]; *never* more than the module asks for: what it sees is a [`Moment`], the
-//! same in training and in flight; *source* Zhou 2017, figure 1.
+//! *in* a plant, a module, the desired output; *out* a [`Run`]; *never* more than the module asks for: what it sees is a
+//! [`Moment`], the same in training and in flight; *source* Zhou 2017, figure 1.
 
 use crate::siso::Scalar;
 

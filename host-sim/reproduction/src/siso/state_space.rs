@@ -1,7 +1,8 @@
 //! Linear systems x(t+1) = A x(t) + b u(t), y(t) = c x(t).
 //!
-//! *in* A, b, c; *out* relative degree, poles, zeros, DC gain, transfer function, and the system as a [`Plant`] in f32 or f64; *never* a
-//! relative degree beyond the order (there is none for a system without input); *source* Zhou 2017, equation (1) and the definition below it.
+//! *in* A, b, c; *out* relative degree, poles, zeros, DC gain, transfer function, and the system as a [`Plant`] in f32 or f64;
+//! *never* a relative degree beyond the order (there is none for a system without input); *source* Zhou 2017, equation (1) and
+//! the definition below it.
 
 use impromptu_diagnosis::transfer_function::TransferFunction;
 use nalgebra::{Complex, DMatrix, DVector, RowDVector};
@@ -99,7 +100,8 @@ impl StateSpace {
         self.transfer_function().gain()
     }
 
-    /// The transfer function, by the method of Leverrier and Faddeev for the denominator and the Markov parameters for the numerator.
+    /// The transfer function, by the method of Leverrier and Faddeev for the denominator and the Markov parameters for the
+    /// numerator.
     pub fn transfer_function(&self) -> TransferFunction {
         let order = self.order();
         let mut denominator = vec![1.0];

@@ -1,12 +1,13 @@
 //! Beyond the paper: feed-forward of a loop whose inverse is unstable, from a window of the desired output alone.
 //!
-//! *in* a system, or runs of it; *out* weights of y_d(t + offset); *never* anything fed back: the reference is bounded by the window's
-//! [`Window::gain`] times the largest |y_d|; *source* an unstable zero has a stable inverse that looks ahead without end (Devasia, Chen and
-//! Paden 1996), which a finite preview cuts off; zero-phase tracking is Tomizuka's (1987); learning the window from logs is Zhou 2017's
-//! training with other features.
+//! *in* a system, or runs of it; *out* weights of y_d(t + offset); *never* anything fed back: the reference is bounded by the
+//! window's [`Window::gain`] times the largest |y_d|; *source* an unstable zero has a stable inverse that looks ahead without end
+//! (Devasia, Chen and Paden 1996), which a finite preview cuts off; zero-phase tracking is Tomizuka's (1987); learning the window
+//! from logs is Zhou 2017's training with other features.
 //!
-//! u(t) is regressed on y(t + offset) of runs of the loop, as the paper trains. The loop is linear and commutes with shifts, so the error which
-//! that minimises is the tracking error for desired outputs of the spectrum of the references in the runs: no more is to be learned from the law.
+//! u(t) is regressed on y(t + offset) of runs of the loop, as the paper trains. The loop is linear and commutes with shifts, so
+//! the error which that minimises is the tracking error for desired outputs of the spectrum of the references in the runs: no
+//! more is to be learned from the law.
 
 use crate::siso::{LinearMap, Module, Moment, Rows, Run, StateSpace};
 
@@ -23,8 +24,8 @@ impl Window {
         Self { taps: vec![(0, 1.0 / system.dc_gain())] }
     }
 
-    /// The stable inverse of a system with a single zero, outside of the unit circle, cut off after `preview` samples. `None` for other
-    /// systems.
+    /// The stable inverse of a system with a single zero, outside of the unit circle, cut off after `preview` samples. `None` for
+    /// other systems.
     pub fn truncated_inverse(system: &StateSpace, preview: usize) -> Option<Self> {
         let transfer = system.transfer_function();
         let &[first, second] = transfer.numerator.as_slice() else { return None };
@@ -45,8 +46,8 @@ impl Window {
         Some(Self { taps: (0..).zip(weights).collect() })
     }
 
-    /// Zero-phase-error tracking control for a system all of whose zeros are taken as uninvertible: the phase of the loop is gone, the gain is
-    /// right at zero frequency.
+    /// Zero-phase-error tracking control for a system all of whose zeros are taken as uninvertible: the phase of the loop is
+    /// gone, the gain is right at zero frequency.
     pub fn zero_phase(system: &StateSpace) -> Self {
         let transfer = system.transfer_function();
         let order = transfer.order() as i64;
@@ -61,8 +62,8 @@ impl Window {
         Self { taps: weights.into_iter().collect() }
     }
 
-    /// Learned from runs of the loop: u(t) regressed on y(t + offset), every `stride` samples; `penalty` as in [`LinearMap::fit`]. `None` if
-    /// the runs do not determine it.
+    /// Learned from runs of the loop: u(t) regressed on y(t + offset), every `stride` samples; `penalty` as in
+    /// [`LinearMap::fit`]. `None` if the runs do not determine it.
     pub fn learn(runs: &[Run<f64>], offsets: &[i64], stride: usize, penalty: f64) -> Option<Self> {
         let (first, last) = (offsets.iter().copied().min()?.min(0), offsets.iter().copied().max()?.max(0));
         let mut rows = Vec::new();
@@ -89,8 +90,8 @@ impl Module<f64> for Window {
     }
 }
 
-/// Offsets of a window that is dense where the inverse changes fast, and half as dense where it decays: from half a second of past to
-/// `preview` samples ahead. `period` is the sampling period, s.
+/// Offsets of a window that is dense where the inverse changes fast, and half as dense where it decays: from half a second of
+/// past to `preview` samples ahead. `period` is the sampling period, s.
 pub fn offsets(preview: i64, period: f64) -> Vec<i64> {
     let samples = |seconds: f64| (seconds / period).round().max(1.0) as i64;
     let mut offsets = vec![-samples(0.5), -samples(0.25), 0];

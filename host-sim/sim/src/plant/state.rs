@@ -92,7 +92,8 @@ pub struct Disturbance {
 }
 
 impl Disturbance {
-    /// Puts the air velocity (m/s) and the added acceleration (m/s²), both world ENU, of one flight into `member` (`member < BATCH`).
+    /// Puts the air velocity (m/s) and the added acceleration (m/s²), both world ENU, of one flight into `member`
+    /// (`member < BATCH`).
     #[inline]
     pub fn set_member(&mut self, member: usize, wind_velocity: [f64; 3], acceleration: [f64; 3]) {
         scatter(&mut self.wind_velocity, member, &wind_velocity);

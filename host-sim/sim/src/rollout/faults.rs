@@ -1,8 +1,8 @@
 //! A flight stack in which something goes wrong between its parts, as a robustness study asks.
 //!
-//! *in* a flight stack, a gain on its feedback lane and a delay of its attitude loop's commands; *out* its motor commands; *never* other bits than
-//! those of [`Flight::step`] with a gain of 1 and no delay; *source* the seams of the flight stack: [`Flight::position_step`] and
-//! [`Flight::attitude_step`].
+//! *in* a flight stack, a gain on its feedback lane and a delay of its attitude loop's commands; *out* its motor commands;
+//! *never* other bits than those of [`Flight::step`] with a gain of 1 and no delay; *source* the seams of the flight stack:
+//! [`Flight::position_step`] and [`Flight::attitude_step`].
 
 use std::collections::VecDeque;
 
@@ -19,7 +19,8 @@ pub struct FaultyFlight<'m> {
     pub flight: Flight<'m>,
     /// Factor on what the loop gets of the feedback lane, unknown to the lane.
     loop_gain: f32,
-    /// Control ticks for which a command of the position loop is on its way to the attitude loop: the link of a position loop off board.
+    /// Control ticks for which a command of the position loop is on its way to the attitude loop: the link of a position loop off
+    /// board.
     command_delay: u32,
     /// Commands on their way, with the control tick at which they are due.
     on_the_way: VecDeque<(u32, ThrustVector)>,

@@ -41,7 +41,8 @@ pub struct FlightPlan<'a> {
     pub guard: GuardSettings,
     /// Whether every reference tick is logged.
     pub log: bool,
-    /// Whether the flight stack's inputs and answers are recorded, so that another machine can fly it again (loop gain 1, no command delay, the default guard).
+    /// Whether the flight stack's inputs and answers are recorded, so that another machine can fly it again (loop gain 1, no
+    /// command delay, the default guard).
     pub record: bool,
 }
 

@@ -1,7 +1,7 @@
 //! What flies a vehicle: the flight stack in this program, or the same one in a microcontroller.
 //!
-//! *in* setpoints ahead of time, and the state at each control tick; *out* motor commands; *never* a time of its own; *source* the calls of
-//! [`impromptu_flight::flight::Flight`].
+//! *in* setpoints ahead of time, and the state at each control tick; *out* motor commands; *never* a time of its own; *source*
+//! the calls of [`impromptu_flight::flight::Flight`].
 
 use impromptu_firmware::{guard::Trips, network::Scratch};
 use impromptu_flight::{

@@ -35,8 +35,9 @@ impl Sample {
 
 /// A desired trajectory, one sample for each tick of the position loop.
 ///
-/// Tick 0 is the beginning of a hover at the first point, [`LEAD_SECONDS`](super::LEAD_SECONDS) long; after the drawn part follows a hover at
-/// the last point, [`TAIL_SECONDS`](super::TAIL_SECONDS) long. Only the drawn part is scored, as in Li et al. 2017.
+/// Tick 0 is the beginning of a hover at the first point, [`LEAD_SECONDS`](super::LEAD_SECONDS) long; after the drawn part
+/// follows a hover at the last point, [`TAIL_SECONDS`](super::TAIL_SECONDS) long. Only the drawn part is scored, as in Li et al.
+/// 2017.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trajectory {
     /// What it is, as the catalogue writes it (for example `strokes:7:3`), or the file's name.

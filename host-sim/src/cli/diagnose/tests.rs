@@ -22,8 +22,8 @@ fn adapted(desired: &Trajectory, add_ons: &[(AddOn, usize); 3]) -> Trajectory {
     Trajectory { samples, ..desired.clone() }
 }
 
-/// The prediction is about a linear window that was trained on the test's logs: here it is, and it flies other tones on the vehicle itself.
-/// 95 % are promised; what was chosen was chosen on other seeds.
+/// The prediction is about a linear window that was trained on the test's logs: here it is, and it flies other tones on the
+/// vehicle itself. 95 % are promised; what was chosen was chosen on other seeds.
 #[test]
 fn what_is_predicted_for_a_vehicle_is_what_it_then_flies() {
     let flown: Vec<(Interval, f64)> =

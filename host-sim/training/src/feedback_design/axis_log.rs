@@ -1,6 +1,7 @@
 //! One axis of a flight as the identification reads it: the signals, and where their lags lie in a row of regressors.
 //!
-//! in: slices of one length; out: rows of regressors and targets; never: a row which changes when the whole flight is moved in space.
+//! in: slices of one length; out: rows of regressors and targets; never: a row which changes when the whole flight is moved in
+//! space.
 
 /// One axis of one flight, sampled at the reference's own rate; all slices have the same length.
 ///

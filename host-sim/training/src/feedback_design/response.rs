@@ -3,13 +3,13 @@
 //! in: an ARX model of one axis; out: the measured position after a box in the position or the velocity reference, in means over
 //! monitor ticks; never: a response of the desired trajectory, which cancels from errors; source: superposition.
 //!
-//! The response to the velocity reference is that of the model too. The dither moves the position reference alone; what the logs tell of the
-//! velocity reference comes from the trajectories, smooth as the corrections are.
+//! The response to the velocity reference is that of the model too. The dither moves the position reference alone; what the logs
+//! tell of the velocity reference comes from the trajectories, smooth as the corrections are.
 
 use super::identification::{ArxModel, OutputEquation};
 
-/// Mean of the measured position over each of `taps` monitor ticks of `divisor` reference ticks, from the one on in which the reference is 1:
-/// of the position reference, and of the velocity reference.
+/// Mean of the measured position over each of `taps` monitor ticks of `divisor` reference ticks, from the one on in which the
+/// reference is 1: of the position reference, and of the velocity reference.
 pub fn box_responses(model: &ArxModel, divisor: usize, taps: usize) -> [Vec<f64>; 2] {
     let pulse = |tick: usize| f64::from(u8::from(tick < divisor));
     [simulate(model, &|tick| [pulse(tick), 0.0], divisor, taps), simulate(model, &|tick| [0.0, pulse(tick)], divisor, taps)]

@@ -1,6 +1,7 @@
 //! The parts of a training step that work number by number. Plain loops: inside `pulp`'s dispatch the compiler turns them
 //! into vector code. (Each closure moves what it writes to into itself: a closure that could be called twice is called through
-//! a shim, which is not inlined and would lose the vector instructions.) None of them adds up in an order that depends on the machine.
+//! a shim, which is not inlined and would lose the vector instructions.) None of them adds up in an order that depends on the
+//! machine.
 
 use impromptu_model_export::batch::padded_matrix::{LANES, PaddedMatrix};
 use pulp::Arch;

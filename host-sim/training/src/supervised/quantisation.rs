@@ -1,8 +1,8 @@
 //! Plain rounding to integers, for the forward pass of quantisation-aware training.
 //!
-//! The exporter has the same step for each row, but rounds more cleverly (`impromptu_model_export::quantise`): an error in one column is made
-//! good by the columns to come, and a packed weight carries a known fraction of a step. So training sees about the noise that export brings,
-//! somewhat more of it at the outputs, and never the very numbers that are flown.
+//! The exporter has the same step for each row, but rounds more cleverly (`impromptu_model_export::quantise`): an error in one
+//! column is made good by the columns to come, and a packed weight carries a known fraction of a step. So training sees about the
+//! noise that export brings, somewhat more of it at the outputs, and never the very numbers that are flown.
 //!
 //! Weights: int8, symmetric, one scale for each output row: `scale = max|w| / 127` (1 for a row of zeros), number =
 //! `w / scale` rounded half away from zero. Activations: a signed integer of n bits with one scale for each layer's input,

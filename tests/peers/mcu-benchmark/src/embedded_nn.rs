@@ -1,6 +1,7 @@
 //! The crate `embedded-nn`: its dense layers in f32 and in int8.
 //!
-//! Its float tanh is x / (1 + |x|), so libm's follows its dense layer; its int8 tanh has no input scale, so int8 is measured on ReLU only.
+//! Its float tanh is x / (1 + |x|), so libm's follows its dense layer; its int8 tanh has no input scale, so int8 is measured on
+//! ReLU only.
 
 use embedded_nn::{
     fully_connected_s8, quantize_f32_to_s8,

@@ -1,7 +1,7 @@
 //! Evaluates one network with one kernel on the emulated STM32F405, between markers that the cycle model counts.
 //!
-//! - in: networks in flash, embedded when this was built (`IMPROMPTU_MCU_IMAGES`, see `build.rs`); `request.bin` in the folder where
-//!   the emulator was started: which kernel, which network, where its weights lie, then rows of inputs (`request.rs`)
+//! - in: networks in flash, embedded when this was built (`IMPROMPTU_MCU_IMAGES`, see `build.rs`); `request.bin` in the folder
+//!   where the emulator was started: which kernel, which network, where its weights lie, then rows of inputs (`request.rs`)
 //! - out: `answer.bin` beside it: stack pointer of the caller, bytes of working memory, then the outputs of each row
 //! - markers: the instruction SEV before and after each evaluation, which does nothing on a single core. No kernel contains it
 //!

@@ -1,7 +1,7 @@
 //! The crate `microflow`: its dense layer, called as the code calls it that its macro makes of a TensorFlow Lite file.
 //!
-//! The macro wants such a file at compile time; here the same numbers, prepared by the compiler out of the int8 images, go into the
-//! same types and the same functions. Shapes are types, so each network has a function of its own. It has no tanh.
+//! The macro wants such a file at compile time; here the same numbers, prepared by the compiler out of the int8 images, go into
+//! the same types and the same functions. Shapes are types, so each network has a function of its own. It has no tanh.
 
 use microflow::{
     activation::FusedActivation,

@@ -1,7 +1,8 @@
 //! Reads the request, lets the kernel work, writes the answer.
 //!
-//! `request.bin`: u32 kernel, u32 number of the network's image, u32 place of the weights (0 flash, 1 RAM), u32 rows, then the inputs of
-//! each row in f32; `answer.bin`: u32 stack pointer of the caller, u32 bytes of working memory, u32 address of the image, then the outputs of each row in f32. Little-endian.
+//! `request.bin`: u32 kernel, u32 number of the network's image, u32 place of the weights (0 flash, 1 RAM), u32 rows, then the
+//! inputs of each row in f32; `answer.bin`: u32 stack pointer of the caller, u32 bytes of working memory, u32 address of the
+//! image, then the outputs of each row in f32. Little-endian.
 
 use core::hint::black_box;
 

@@ -1,10 +1,10 @@
-//! A Crazyflie 2.x: STM32F405, brushed motors, the link on the deck port UART1. Not flown yet: it builds, and the emulated board, which shares all
-//! but pins and clocks, flies.
+//! A Crazyflie 2.x: STM32F405, brushed motors, the link on the deck port UART1. Not flown yet: it builds, and the emulated board,
+//! which shares all but pins and clocks, flies.
 //!
 //! - in: the link's bytes, the models in flash
 //! - out: duty cycles of four motors, the link's bytes
-//! - never: motors that turn after a panic, a fault or a hang. All three end in a reset, after which every pin is an input and the gates'
-//!   resistors hold the motors off
+//! - never: motors that turn after a panic, a fault or a hang. All three end in a reset, after which every pin is an input and
+//!   the gates' resistors hold the motors off
 //!
 //! | task | bound to | priority | |
 //! |---|---|---|---|

@@ -1,4 +1,5 @@
-//! The motors of a Crazyflie 2.x: M1 PA1, M2 PB11, M3 PA15, M4 PB9, 328 kHz in 256 steps, as `motors.c` of Bitcraze's firmware drives them.
+//! The motors of a Crazyflie 2.x: M1 PA1, M2 PB11, M3 PA15, M4 PB9, 328 kHz in 256 steps, as `motors.c` of Bitcraze's firmware
+//! drives them.
 
 use impromptu_board::motor::duty;
 use impromptu_flight::types::MotorCommand;

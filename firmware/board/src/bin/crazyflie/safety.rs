@@ -19,8 +19,9 @@ fn panic(_: &PanicInfo<'_>) -> ! {
     SCB::sys_reset()
 }
 
-/// Stands for the handler of hard faults (`--defsym` in build.rs), which cortex-m-rt would have be unsafe; usage faults alone are not enabled. A fault while this handler is entered, as of a
-/// stack that overflowed, locks the core up, and the watchdog resets it.
+/// Stands for the handler of hard faults (`--defsym` in build.rs), which cortex-m-rt would have be unsafe; usage faults alone are
+/// not enabled. A fault while this handler is entered, as of a stack that overflowed, locks the core up, and the watchdog resets
+/// it.
 #[exception]
 fn UsageFault() -> ! {
     SCB::sys_reset()

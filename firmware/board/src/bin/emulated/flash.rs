@@ -1,4 +1,5 @@
-//! The spare slot of the emulated board, whose flash can be read and not written: RAM, which a file keeps for the emulator's next start.
+//! The spare slot of the emulated board, whose flash can be read and not written: RAM, which a file keeps for the emulator's next
+//! start.
 //!
 //! - in: what a flash driver is asked
 //! - out: `slot0.bin` or `slot1.bin`, which whoever starts the emulator puts into its flash

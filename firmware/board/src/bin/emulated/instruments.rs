@@ -27,8 +27,8 @@ impl Timer for stm32f4::stm32f405::TIM5 {
 
 /// Counts executed instructions with one of the 32-bit timers.
 ///
-/// Under `-icount shift=N` an instruction takes 2^N nanoseconds of virtual time, and QEMU's timers 2 to 5 show the virtual time in
-/// nanoseconds: the difference of two readings is exact, and the same in every run.
+/// Under `-icount shift=N` an instruction takes 2^N nanoseconds of virtual time, and QEMU's timers 2 to 5 show the virtual time
+/// in nanoseconds: the difference of two readings is exact, and the same in every run.
 pub(crate) struct Counter<T> {
     timer: T,
     /// Nanoseconds of an instruction.

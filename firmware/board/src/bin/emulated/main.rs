@@ -1,4 +1,5 @@
-//! The emulated board: QEMU's `netduinoplus2`, an STM32F405, flies in real time, and the plant is a peripheral that the host simulates.
+//! The emulated board: QEMU's `netduinoplus2`, an STM32F405, flies in real time, and the plant is a peripheral that the host
+//! simulates.
 //!
 //! - in: the flash with its slots; the link's bytes
 //! - out: the link's bytes; a slot that was written, as a file in the folder where the emulator was started

@@ -1,8 +1,8 @@
 //! The link's bytes: in lockstep with the host, or over the serial port.
 //!
-//! **Lockstep** (`to_firmware` and `from_firmware` are in the emulator's folder, as FIFOs): in each control tick the firmware reads one batch
-//! and writes one, each a length (u32, little-endian) and so many bytes. Semihosting takes no virtual time: for the firmware the plant is
-//! a peripheral that answers at once, and every run is the same. A length of 2^32 - 1 ends the flight.
+//! **Lockstep** (`to_firmware` and `from_firmware` are in the emulator's folder, as FIFOs): in each control tick the firmware
+//! reads one batch and writes one, each a length (u32, little-endian) and so many bytes. Semihosting takes no virtual time: for
+//! the firmware the plant is a peripheral that answers at once, and every run is the same. A length of 2^32 - 1 ends the flight.
 //!
 //! **Serial** (else): USART1. A tick is flown when a new attitude has arrived.
 

@@ -6,8 +6,8 @@
 //! - never: touches clocks or pins. QEMU's RCC reads 0, so waiting for a crystal would never end. The time to read or write a
 //!   file is never part of a stage
 //!
-//! `IMPROMPTU_MODEL=FILE cargo board`, in the folder of the recording; FILE is absolute, or starts at the top of the repository. The
-//! exit code is 0 on success, 1 if the model or the recording is refused and 101 on a panic; a HardFault aborts the emulator.
+//! `IMPROMPTU_MODEL=FILE cargo board`, in the folder of the recording; FILE is absolute, or starts at the top of the repository.
+//! The exit code is 0 on success, 1 if the model or the recording is refused and 101 on a panic; a HardFault aborts the emulator.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]

@@ -1,11 +1,12 @@
 /*
- * Out-of-tree controller for the Crazyflie's firmware: flies a trajectory that was uploaded, with references corrected by Impromptu, through
- * the stock Mellinger controller.
+ * Out-of-tree controller for the Crazyflie's firmware: flies a trajectory that was uploaded, with references corrected by
+ * Impromptu, through the stock Mellinger controller.
  *
- * The trajectory is what every ground station uploads for the high-level commander: pieces of polynomials in the trajectory memory. The
- * commander gives setpoints of the present only, but the add-on looks ahead; so this controller evaluates the pieces itself, as far ahead
- * as the model asks. Take off and hover with the high-level commander, then set the parameter impromptu.pieces to the number of
- * pieces. Zero gives the setpoints back to the commander, whose setpoints pass through here untouched.
+ * The trajectory is what every ground station uploads for the high-level commander: pieces of polynomials in the trajectory
+ * memory. The commander gives setpoints of the present only, but the add-on looks ahead; so this controller evaluates the pieces
+ * itself, as far ahead as the model asks. Take off and hover with the high-level commander, then set the parameter
+ * impromptu.pieces to the number of pieces. Zero gives the setpoints back to the commander, whose setpoints pass through here
+ * untouched.
  *
  * Everything that differs between the Crazyflie and Impromptu is converted in `measure` and `evaluate`, nowhere else.
  */
@@ -53,7 +54,8 @@ static float reference[REFERENCE];
 static float yaw;
 
 /* Hand-over between the stabilizer task, which may not wait for the network, and the app task, which evaluates it. Each flag is set by one
- * side and cleared by the other; only the side whose turn it is touches the data. One core: the order of the program is enough. */
+ * side and cleared by the other; only the side whose turn it is touches the data. One core: the order of the program is enough.
+ * */
 static impromptu_job job;
 static impromptu_inference inference;
 static volatile bool job_waits, inference_waits;

@@ -1,7 +1,8 @@
 //! What the paper names but does not show, or leaves to later work, tried on loops that are known exactly.
 //!
-//! *in* a seed; *out* errors of several modules on signals that none was trained on; *never* a choice made on those signals; *source* Zhou 2017:
-//! equations (6) and (7), local relative degrees (section III-A), non-minimum-phase loops (section VI); what differs stands in each file.
+//! *in* a seed; *out* errors of several modules on signals that none was trained on; *never* a choice made on those signals;
+//! *source* Zhou 2017: equations (6) and (7), local relative degrees (section III-A), non-minimum-phase loops (section VI); what
+//! differs stands in each file.
 
 pub mod flights;
 pub mod input_affine;

@@ -1,8 +1,9 @@
 //! The non-minimum-phase loop S2 with a window of the desired output: how much, on which signals, for how much preview.
 //!
-//! *in* a seed; *out* tracking errors of several feed-forward modules on signals of four kinds; *never* one of these signals in training, nor a
-//! reference beyond the window's gain; *source* [`crate::siso::window`]. What counts is y - y_d while the trajectory lasts, from its first sample to
-//! its last: the loop may start before it, as long as the preview reaches, and rests at zero before.
+//! *in* a seed; *out* tracking errors of several feed-forward modules on signals of four kinds; *never* one of these signals in
+//! training, nor a reference beyond the window's gain; *source* [`crate::siso::window`]. What counts is y - y_d while the
+//! trajectory lasts, from its first sample to its last: the loop may start before it, as long as the preview reaches, and rests
+//! at zero before.
 
 use impromptu_sim::trajectory::tones::smooth_step;
 use rayon::prelude::*;
@@ -19,8 +20,8 @@ pub struct Signal {
 
 /// Length of every signal, s.
 pub const SECONDS: f64 = 60.0;
-/// Ridge of the learned window: what noise of 1 % in the logged outputs would do. Smooth signals hardly tell the taps apart; without it they are
-/// large, and the corner at a trajectory's end goes through them.
+/// Ridge of the learned window: what noise of 1 % in the logged outputs would do. Smooth signals hardly tell the taps apart;
+/// without it they are large, and the corner at a trajectory's end goes through them.
 pub const PENALTY: f64 = 1e-4;
 /// Band of the references in training, Hz.
 pub const BAND: [f64; 2] = [0.01, 1.0];

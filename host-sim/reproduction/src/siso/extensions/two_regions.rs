@@ -1,8 +1,8 @@
-//! A loop whose relative degree and gain depend on the region: one module for all of it, two that switch hard, and two with the firmware's
-//! selector.
+//! A loop whose relative degree and gain depend on the region: one module for all of it, two that switch hard, and two with the
+//! firmware's selector.
 //!
-//! *in* a seed; *out* tracking errors, changes of region and the largest jump of the reference; *never* another selector than the firmware's;
-//! *source* Zhou 2017, section III-A (several modules for several operating regions).
+//! *in* a seed; *out* tracking errors, changes of region and the largest jump of the reference; *never* another selector than the
+//! firmware's; *source* Zhou 2017, section III-A (several modules for several operating regions).
 
 use std::cell::RefCell;
 
