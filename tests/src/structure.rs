@@ -64,14 +64,17 @@ impl Structure {
             .collect()
     }
 
-    /// Layers that the root's documentation states, the lowest first.
+    /// Layers that the root's documentation states, the lowest first; rows with the same number are one layer.
     pub fn layers(&self) -> Vec<Vec<String>> {
-        let rows = self.root.documentation.lines().filter_map(|line| {
-            let mut cells = line.trim().strip_prefix('|')?.split('|').map(str::trim);
-            cells.next()?.parse::<usize>().ok()?;
-            Some(cells.next()?.split(',').map(|name| name.trim().trim_matches('`').to_owned()).collect())
-        });
-        rows.collect()
+        let mut layers: BTreeMap<usize, Vec<String>> = BTreeMap::new();
+        for line in self.root.documentation.lines() {
+            let Some(row) = line.trim().strip_prefix('|') else { continue };
+            let mut cells = row.split('|').map(str::trim);
+            if let (Some(Ok(number)), Some(names)) = (cells.next().map(str::parse), cells.next()) {
+                layers.entry(number).or_default().extend(names.split(',').map(|name| name.trim().trim_matches('`').to_owned()));
+            }
+        }
+        layers.into_values().collect()
     }
 
     /// What contradicts the stated layers: modules that are missing or listed twice, arrows that do not run downwards.

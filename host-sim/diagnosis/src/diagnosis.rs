@@ -46,7 +46,8 @@ pub enum DiagnosisError {
     NoExcitation,
     /// The reference holds too few tones.
     #[error(
-        "too little excitation: the reference tells {order} coefficients apart, as {tones} sine(s) would, and {needed} are needed; log steps of random height, or five tones or more"
+        "too little excitation: the reference tells {order} coefficients apart, as {tones} sine(s) would, and {needed} are \
+         needed; log steps of random height, or five tones or more"
     )]
     FewTones {
         /// Coefficients told apart.
@@ -61,7 +62,8 @@ pub enum DiagnosisError {
     NoAnswer,
     /// Nothing explains the record.
     #[error(
-        "no stable linear model explains the log (best: {percent:.0} % of the measured variance); check which column is which, cut out take-off, landing and failures, or log with larger amplitude"
+        "no stable linear model explains the log (best: {percent:.0} % of the measured variance); check which column is which, \
+         cut out take-off, landing and failures, or log with larger amplitude"
     )]
     Unexplained {
         /// Share explained by the best model, %.
@@ -77,7 +79,8 @@ pub enum DiagnosisError {
     },
     /// At the sub-rate the record is too short.
     #[error(
-        "{rows} rows at the sub-rate of {sub_rate_hz:.2} Hz are too few: at least {needed} are needed; log longer, or ask for a higher --sub-rate"
+        "{rows} rows at the sub-rate of {sub_rate_hz:.2} Hz are too few: at least {needed} are needed; log longer, or ask for a \
+         higher --sub-rate"
     )]
     Short {
         /// Rows at the sub-rate.

@@ -48,7 +48,8 @@ pub enum RecordError {
     },
     /// Time that is not uniform.
     #[error(
-        "row {row}: {found:.4} s after the row before, where {usual:.4} s are usual; resample the log to a uniform rate, or cut it there"
+        "row {row}: {found:.4} s after the row before, where {usual:.4} s are usual; resample the log to a uniform rate, or cut \
+         it there"
     )]
     NotUniform {
         /// Row, from 0.

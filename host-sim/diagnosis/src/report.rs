@@ -32,7 +32,8 @@ impl Diagnosis {
                 }
                 if let Gate::Failed(_) = self.gates.stable_inverse {
                     text += &format!(
-                        ". Not the inverse, but a window over the desired output alone stays bounded; its predicted reduction is {reduction}"
+                        ". Not the inverse, but a window over the desired output alone stays bounded; its predicted reduction \
+                         is {reduction}"
                     );
                 } else if prediction.reduction_percent.value < LEAST_REDUCTION {
                     text += &format!(
@@ -81,7 +82,8 @@ impl Diagnosis {
         }
         let reduction = prediction.reduction_percent;
         if reduction.value >= LEAST_REDUCTION && reduction.low < LEAST_REDUCTION {
-            let why = "the predicted reduction reaches down to harm: the log leaves too many models; a longer or quieter one, or a slower \
+            let why = "the predicted reduction reaches down to harm: the log leaves too many models; a longer or quieter one, \
+            or a slower \
                        --sub-rate, decides";
             lines.push(line("undecided", why.into()));
         }
@@ -101,7 +103,8 @@ impl Diagnosis {
         lines.push(line(
             "predicted error",
             format!(
-                "{:.3e} {unit} RMS without, {:.3e} ({:.3e} … {:.3e}) with the add-on; noise alone {:.3e}; on signals of the log's kind",
+                "{:.3e} {unit} RMS without, {:.3e} ({:.3e} … {:.3e}) with the add-on; noise alone {:.3e}; on signals of the \
+                 log's kind",
                 prediction.baseline.value,
                 prediction.with_add_on.value,
                 prediction.with_add_on.low,
@@ -115,7 +118,8 @@ impl Diagnosis {
         lines.push(line(
             "relative degree",
             format!(
-                "{} strict (first coefficient that the data tell from zero); {} practical (first tick above {:.0} % of the step); ticks of {tick:.1} ms",
+                "{} strict (first coefficient that the data tell from zero); {} practical (first tick above {:.0} % of the \
+                 step); ticks of {tick:.1} ms",
                 degree(properties.strict_degree),
                 degree(properties.practical_degree),
                 100.0 * THRESHOLD

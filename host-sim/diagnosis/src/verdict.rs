@@ -115,7 +115,8 @@ fn unit_gain(properties: &Properties) -> Gate {
         Gate::Undecided(format!("steady-state gain {range}: the log does not show that it is 1; add slow tones or longer steps"))
     } else {
         Gate::Failed(format!(
-            "steady-state gain {range} is not 1: difference learning leaves a bias that grows with the reference; use absolute features"
+            "steady-state gain {range} is not 1: difference learning leaves a bias that grows with the reference; use absolute \
+             features"
         ))
     }
 }
@@ -153,7 +154,8 @@ fn excitation(properties: &Properties, coverage: &Coverage) -> Gate {
     let percent = 100.0 * coverage.share;
     if coverage.share < LEAST_COVERAGE {
         Gate::Failed(format!(
-            "the reference shows only {percent:.0} % of the loop's band (0 … {:.2} Hz) above the noise: fly steps, or many tones up to there",
+            "the reference shows only {percent:.0} % of the loop's band (0 … {:.2} Hz) above the noise: fly steps, or many \
+             tones up to there",
             properties.bandwidth_hz.value
         ))
     } else {

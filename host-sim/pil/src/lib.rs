@@ -9,9 +9,12 @@
 //!
 //! | layer | modules | what they hold |
 //! |---|---|---|
-//! | 1 | `line`, `emulator`, `flash`, `error` | bytes to and from the firmware; builds and QEMU; models in an ELF file; why nothing flies |
-//! | 2 | `lockstep`, `serial`, `faults`, `board` | lines through FIFOs, a socket, or with faults; the microcontroller as a flight stack |
-//! | 3 | `connection`, `upload`, `flights` | kinds of link, and what each needs of the system; a model over the link; flights beside the software's |
+//! | 1 | `line`, `emulator` | bytes to and from the firmware; builds and QEMU |
+//! | 1 | `flash`, `error` | models in an ELF file; why nothing flies |
+//! | 2 | `lockstep`, `serial`, `faults` | lines through FIFOs, a socket, or with faults |
+//! | 2 | `board` | the microcontroller as a flight stack |
+//! | 3 | `connection`, `upload` | kinds of link, and what each needs of the system; a model over the link |
+//! | 3 | `flights` | flights beside the software's |
 //! | 4 | `emulated` | the emulated board with a model in its flash |
 
 mod board;

@@ -66,7 +66,8 @@ fn legend(results: &Results, cases: &[Case<'_>]) -> String {
 Each cell, {flights}: mean RMS position error in cm; below it its reduction in %, mean/worst flight.
   RMS of one flight = sqrt(mean |desired - flown|^2) over the scored part: true position, three axes together.
   Reduction of one flight = 100 (1 - RMS / baseline's RMS on the same trajectory); below 0 it is worse than the baseline.
-  flatness: desired acceleration / kp added to the reference. lane: feedback lane. net: network lane. ridge: linear, same features.
+  flatness: desired acceleration / kp added to the reference. lane: feedback lane. net: network lane. ridge: linear, same \
+  features.
   net int8 + lane is what is flashed. 1.7x: times the drawn speed. +20ms: 20 ms more delay in the whole loop, at test time only.
 "
     );
@@ -94,7 +95,8 @@ stock lab 1x                20.0/-20.0  89.0/88.0  97.0/96.0
 Each cell, over 2 flights of unseen trajectories: mean RMS position error in cm; below it its reduction in %, mean/worst flight.
   RMS of one flight = sqrt(mean |desired - flown|^2) over the scored part: true position, three axes together.
   Reduction of one flight = 100 (1 - RMS / baseline's RMS on the same trajectory); below 0 it is worse than the baseline.
-  flatness: desired acceleration / kp added to the reference. lane: feedback lane. net: network lane. ridge: linear, same features.
+  flatness: desired acceleration / kp added to the reference. lane: feedback lane. net: network lane. ridge: linear, same \
+  features.
   net int8 + lane is what is flashed. 1.7x: times the drawn speed. +20ms: 20 ms more delay in the whole loop, at test time only.
 Seed 7, version 0.1.0. Again: host-sim --seed 7
 ";

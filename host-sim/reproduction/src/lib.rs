@@ -9,7 +9,8 @@
 //! | layer | modules | what they hold |
 //! |---|---|---|
 //! | 1 | `siso` | the add-on on small loops: laws, samples, a network by Levenberg-Marquardt, deployment |
-//! | 2 | `lti`, `extensions`, `quadrotor`, `robustness` | linear systems; what the paper leaves to later work; the quadrotor; other vehicles, loops and air |
+//! | 2 | `lti`, `extensions` | linear systems; what the paper leaves to later work |
+//! | 2 | `quadrotor`, `robustness` | the quadrotor; other vehicles, loops and air |
 
 #[cfg(test)]
 mod checks;

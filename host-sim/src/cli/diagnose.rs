@@ -38,9 +38,12 @@ A log is a CSV file with a header, one row a tick at a uniform rate, of the base
 Log steps of random height, or five tones and more, over the band that will be flown, for some hundred times the loop's response.
 measured is what the loop was told; if that is old, say how old with --delay-ms.
 
-Relative degree, gain, zeros and bandwidth are those of the reference to the measured value at the sub-rate. Intervals hold 95 % of the
-linear models that could be the true one; at the lower end of the predicted reduction, what the log leaves unexplained is the loop's doing and
-comes again, 1.4 times as large. The prediction is about a linear window over the desired output, trained on such a log and flown along signals
+Relative degree, gain, zeros and bandwidth are those of the reference to the measured value at the sub-rate. Intervals hold 95 \
+% of the
+linear models that could be the true one; at the lower end of the predicted reduction, what the log leaves unexplained is the \
+loop's doing and
+comes again, 1.4 times as large. The prediction is about a linear window over the desired output, trained on such a log and \
+flown along signals
 of the log's kind: measured errors, so with the noise in them.
 
 Examples:

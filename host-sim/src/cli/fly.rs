@@ -63,7 +63,8 @@ pub(super) struct Fly {
     #[arg(long, value_enum, default_value_t, requires = "pil")]
     link: LinkKind,
     /// With --pil and without --trajectory: number of strokes.
-    #[arg(long, value_name = "N", default_value = "30", requires = "pil", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, value_name = "N", default_value = "30", requires = "pil")]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=10_000))]
     strokes: u32,
     /// CSV file for the log of the last flight: the add-on's, or the baseline's without --model.
     #[arg(long, value_name = "OUT.csv", conflicts_with = "pil")]

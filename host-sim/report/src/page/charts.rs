@@ -44,7 +44,8 @@ pub(super) fn sections(
     Ok(html! {
         (section("Which part does what", html! {
             p { "Reduction of the error by method: the mean over all flights, and how far the worst flight falls behind it. "
-                "The scale is logarithmic in the error that is left, as reductions crowd near 100 %; below 0 % they are drawn at 0. The figures at the right are mean / worst." }
+                "The scale is logarithmic in the error that is left, as reductions crowd near 100 %; below 0 % they are drawn \
+                 at 0. The figures at the right are mean / worst." }
             ul.legend {
                 (key("dot comparison", "mean")) (key("ring comparison", "worst flight"))
                 (key("comparison", "not learned, or feedback alone")) (key("ridge", "ridge, linear"))
@@ -52,12 +53,14 @@ pub(super) fn sections(
             }
         }, &reductions))
         (section("Every flight", html! {
-            p { "Each dot is one flight\u{2019}s RMS error. The scale is logarithmic: a step to the left of one decade is 90 % less error. "
+            p { "Each dot is one flight\u{2019}s RMS error. The scale is logarithmic: a step to the left of one decade is 90 % \
+            less error. "
                 "The figure at the right is the worst flight." }
             ul.legend { (key("dot comparison", "one flight")) (key("bar", "median")) (key("ring comparison", "worst flight")) }
         }, &errors))
         (section("Flying faster", html! {
-            p { "The same strokes at a multiple of the drawn speed. Mean reduction of the error; the vertical axis does not start at 0." }
+            p { "The same strokes at a multiple of the drawn speed. Mean reduction of the error; the vertical axis does not \
+            start at 0." }
             ul.legend {
                 @for method in plots::methods_by_speed() { (key(plots::colour_class(method), &method.label())) }
             }
@@ -95,7 +98,8 @@ fn paths(scenes: &[Scene<'_>]) -> anyhow::Result<Markup> {
     Ok(section(
         "Paths in space",
         html! {
-            p { "One metre is as long across as it is up. Where the blue line runs inside the grey band, the flight is on the desired path." }
+            p { "One metre is as long across as it is up. Where the blue line runs inside the grey band, the flight is on the \
+            desired path." }
             (curves_legend(scenes, false))
         },
         &[(html! { "Scored part of the flight" }, panels)],
@@ -119,7 +123,8 @@ fn one_flight(scenes: &[Scene<'_>]) -> anyhow::Result<Markup> {
     Ok(html! {
         section {
             h2 { "One flight in detail" }
-            p { (short(&first.trajectory)) ", " (first.vehicle) ", " (first.gains) " gains, " (circumstances(first)) (add_on) "." }
+            p { (short(&first.trajectory)) ", " (first.vehicle) ", \
+            " (first.gains) " gains, " (circumstances(first)) (add_on) "." }
             (curves_legend(scenes, true))
             @if !positions.is_empty() {
                 h3 { "Position" }
@@ -133,7 +138,8 @@ fn one_flight(scenes: &[Scene<'_>]) -> anyhow::Result<Markup> {
             }
             @if !corrections.is_empty() {
                 h3 { "What the add-on asks the loop for" }
-                p { "Position reference less desired position. The add-on moves nothing else but this reference and the matching velocity reference." }
+                p { "Position reference less desired position. The add-on moves nothing else but this reference and the \
+                matching velocity reference." }
                 div.panels { @for svg in &corrections { figure { (svg) } } }
             }
         }

@@ -34,7 +34,8 @@ pub fn render_html(results: &Results) -> anyhow::Result<String> {
         header {
             h1 { (results.title) }
             p.lead {
-                "A learned add-on corrects the reference that a quadrotor\u{2019}s control loop is given; the loop itself stays as it is. "
+                "A learned add-on corrects the reference that a quadrotor\u{2019}s control loop is given; the loop itself stays \
+                 as it is. "
                 "Every number here is simulated, in closed loop, on trajectories that the add-on was not trained on."
             }
             dl.facts {

@@ -12,8 +12,10 @@ pub(super) fn models(models: &[ModelCard]) -> Markup {
         @if !models.is_empty() {
             section {
                 h2 #models { "The models" }
-                p { "Margins are those of the add-on\u{2019}s own feedback loop: the delay and the factor on the loop gain that it would still stand, "
-                    "and the smallest distance of its Nyquist curve from \u{2212}1. Quantisation: RMS difference between the int8 and the f32 network\u{2019}s corrections." }
+                p { "Margins are those of the add-on\u{2019}s own feedback loop: the delay and the factor on the loop gain that \
+                it would still stand, "
+                    "and the smallest distance of its Nyquist curve from \u{2212}1. Quantisation: RMS difference between the \
+                     int8 and the f32 network\u{2019}s corrections." }
                 div.scroll tabindex="0" role="region" aria-labelledby="models" {
                     table.numbers {
                         thead { tr {

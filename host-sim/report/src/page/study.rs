@@ -35,7 +35,8 @@ pub fn render_study(study: &Study) -> anyhow::Result<String> {
                         figure {
                             figcaption { (figure.title) }
                             ul.legend { @for (index, curve) in figure.curves.iter().enumerate() {
-                                li { span style=(format!("color:var(--{})", colour_variable(index))) { "\u{25cf} " } (curve.label) }
+                                li { span style=(format!("color:var(--{})", colour_variable(index))) { "\u{25cf} \
+                                " } (curve.label) }
                             } }
                             (panel)
                         }

@@ -17,9 +17,11 @@ pub(super) fn definitions(results: &Results, methods: &[Method]) -> Markup {
             h3 { "The measure" }
             dl.words {
                 dt { "RMS error" }
-                dd { "Square root of the mean squared distance between desired and true position over the scored part of one flight." }
+                dd { "Square root of the mean squared distance between desired and true position over the scored part of one \
+                flight." }
                 dt { "Reduction" }
-                dd { "100 % less the ratio of that error to the baseline\u{2019}s on the same trajectory, for each flight; then the mean and the smallest "
+                dd { "100 % less the ratio of that error to the baseline\u{2019}s on the same trajectory, for each flight; then \
+                the mean and the smallest "
                     "over all flights. Below 0 % the flight was worse than without the add-on." }
                 dt { "Speed" }
                 dd { "Factor on the speed at which the trajectory was drawn; accelerations grow with its square." }
@@ -49,11 +51,13 @@ fn in_words(results: &Results, condition: &str) -> Option<String> {
     let usual = match condition {
         "clean" => "No delay, no noise, no disturbance: what remains is the loop\u{2019}s own lag.",
         "lab" => {
-            "Measurements 24 ms late; noise of 0.3 mm, 1 cm/s, 2 mrad and 0.02 rad/s (position, velocity, attitude, rate; standard deviations); \
+            "Measurements 24 ms late; noise of 0.3 mm, 1 cm/s, 2 mrad and 0.02 rad/s (position, velocity, attitude, rate; \
+             standard deviations); \
              random gusts of 0.05 m/s\u{b2} that last about 0.4 s."
         }
         "rough" => {
-            "Measurements 24 ms late; noise of 0.7 mm, 2 cm/s, 4 mrad and 0.03 rad/s; random gusts of 0.12 m/s\u{b2} that last about 0.4 s."
+            "Measurements 24 ms late; noise of 0.7 mm, 2 cm/s, 4 mrad and 0.03 rad/s; random gusts of 0.12 m/s\u{b2} that last \
+             about 0.4 s."
         }
         _ => return None,
     };

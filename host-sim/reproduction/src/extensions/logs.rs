@@ -67,11 +67,16 @@ pub(super) fn add(study: &mut Study, folder: Option<&Path>) -> Result<()> {
     let predictions = flights::predict(&flights)?;
     study.note(
         SECTION,
-        "Nothing was flown here. A delay and a second-order lag are identified from the flights of all other families (copies under another name \
-         are dropped by content), a window of the desired position is learned from the same flights, and the model says what the window would leave. That \
-         is a model's word about a model: it shares the model's blind spots (saturation, wind, the battery, what set-points faster than the logged ones do). \
-         The model's free run misses the measured flights by the misfit below; a predicted error smaller than that is no more than \u{201c}about the misfit \
-         or less\u{201d}, and the cautious number adds the misfit. Nearly all of the baseline's error is lag: a pure time shift must stand beside it.",
+        "Nothing was flown here. A delay and a second-order lag are identified from the flights of all other families (copies \
+         under another name \
+         are dropped by content), a window of the desired position is learned from the same flights, and the model says what \
+         the window would leave. That \
+         is a model's word about a model: it shares the model's blind spots (saturation, wind, the battery, what set-points \
+         faster than the logged ones do). \
+         The model's free run misses the measured flights by the misfit below; a predicted error smaller than that is no more \
+         than \u{201c}about the misfit \
+         or less\u{201d}, and the cautious number adds the misfit. Nearly all of the baseline's error is lag: a pure time shift \
+         must stand beside it.",
     );
     let count = predictions.len() as f64;
     study.find(Finding::new(SECTION, "logs_flights", &[], "flights predicted, each from other families", count, ""));

@@ -16,8 +16,10 @@ pub(super) fn add(study: &mut Study, settings: &Settings, others: u64, seed: u64
     let trials = input_affine::run(settings, others, seed);
     study.note(
         SECTION,
-        "y(t+1) = \u{125}(x) + D(x) u(t) with D from 0.15 to 0.45 and a hidden state. The network (2 hidden layers, Levenberg-Marquardt) \
-         and ridge get the same features {x(t), y_d(t+1)} and the same rows: random multisines, none of which is flown. RMS over the paper's \
+        "y(t+1) = \u{125}(x) + D(x) u(t) with D from 0.15 to 0.45 and a hidden state. The network (2 hidden layers, \
+         Levenberg-Marquardt) \
+         and ridge get the same features {x(t), y_d(t+1)} and the same rows: random multisines, none of which is flown. RMS \
+         over the paper's \
          test trajectory and random ones; the last number of each kind is the worst trajectory's.",
     );
     let mut find = |name: &str, what: &str, errors: Vec<f64>| {

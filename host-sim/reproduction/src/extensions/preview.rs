@@ -37,10 +37,14 @@ pub(super) fn add(study: &mut Study, each: u64, seed: u64) -> anyhow::Result<()>
     let unprepared = preview::fly("learned window, 30 s, loop starts with the trajectory", &long, &signals, 0.0);
     study.note(
         SECTION,
-        "The exact inverse of S2 is unstable. A window of y_d alone (half a second of past, the rest preview, 4 to 2 samples a second) is bounded by \
-         construction. It is learned as the paper trains, u regressed on the outputs of logged runs, with random multisines of 0.01-1 Hz; none of the \
-         signals below was in training. Reductions are against y_d as reference. That is a poor baseline here (DC gain -2.57, wrong sign): \
-         a reference of zero and y_d over the DC gain stand beside it, and the reduction against the best of the three is the one to quote. The loop \
+        "The exact inverse of S2 is unstable. A window of y_d alone (half a second of past, the rest preview, 4 to 2 samples a \
+         second) is bounded by \
+         construction. It is learned as the paper trains, u regressed on the outputs of logged runs, with random multisines of \
+         0.01-1 Hz; none of the \
+         signals below was in training. Reductions are against y_d as reference. That is a poor baseline here (DC gain -2.57, \
+         wrong sign): \
+         a reference of zero and y_d over the DC gain stand beside it, and the reduction against the best of the three is the \
+         one to quote. The loop \
          starts before the trajectory, as long as the preview reaches; without that the start of the trajectory is lost.",
     );
     for kind in kinds(&signals) {

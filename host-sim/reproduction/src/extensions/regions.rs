@@ -21,10 +21,14 @@ pub(super) fn add(study: &mut Study, settings: &Settings, others: u64, seed: u64
     study.note(
         SECTION,
         &format!(
-            "Below y = 1 the relative degree is 1 and the DC gain 1, above it 2 and 1.6. The output is measured with noise of {NOISE}. One \
-             module for all, with either preview or with both; two modules that switch at the border; two modules with the firmware's selector \
-             (hysteresis ±{HYSTERESIS}, change-over in {FADE} samples). 40 s across the border, along it within the noise, and random trajectories. \
-             Along the border the region changes all the time, whatever selects it: the reference that suits one side drives the output over \
+            "Below y = 1 the relative degree is 1 and the DC gain 1, above it 2 and 1.6. The output is measured with noise of \
+             {NOISE}. One \
+             module for all, with either preview or with both; two modules that switch at the border; two modules with the \
+             firmware's selector \
+             (hysteresis ±{HYSTERESIS}, change-over in {FADE} samples). 40 s across the border, along it within the noise, and \
+             random trajectories. \
+             Along the border the region changes all the time, whatever selects it: the reference that suits one side drives \
+             the output over \
              to the other, by more than any hysteresis that is narrower than the gains are apart."
         ),
     );

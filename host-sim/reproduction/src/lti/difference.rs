@@ -60,10 +60,14 @@ pub(super) fn add(study: &mut Study, settings: &Settings) -> Result<()> {
     }
     study.note(
         SECTION,
-        "Without steady-state error the network would have to add K / K0 - K, another number for each K, to the same inputs: only K0 = 1 lets it. \
-         The steady state is K0 (K + b) with the one b that training left. The state does not help: in training y_d(t) is y(t), so that x1 - y_d is \
-         always zero there. With state features and K0 other than 1 the loop does not even come to rest, and the numbers found are those of the last \
-         sample: on sines the acceleration tells where one is (p = -a / omega^2), the network reads K / K0 - K from it with a very large gain on the \
+        "Without steady-state error the network would have to add K / K0 - K, another number for each K, to the same inputs: \
+         only K0 = 1 lets it. \
+         The steady state is K0 (K + b) with the one b that training left. The state does not help: in training y_d(t) is y(t), \
+         so that x1 - y_d is \
+         always zero there. With state features and K0 other than 1 the loop does not even come to rest, and the numbers found \
+         are those of the last \
+         sample: on sines the acceleration tells where one is (p = -a / omega^2), the network reads K / K0 - K from it with a \
+         very large gain on the \
          second difference, and this feedback moves a pole of the loop out of the unit circle, as the largest poles below say.",
     );
     Ok(())

@@ -41,8 +41,10 @@ pub(super) fn add(study: &mut Study) {
     study.draw(panel::over_time(SECTION, "exact_law_error", title, panel::error_axis(), curves));
     study.note(
         SECTION,
-        "The add-on reads the desired output r samples ahead: that is the preview it needs. Beyond the end of a trajectory the last sample is \
-         held. S2's inverse is unstable (its zero lies outside of the unit circle), so that Insight 1b refuses it: rounding errors grow as 1.002 \
+        "The add-on reads the desired output r samples ahead: that is the preview it needs. Beyond the end of a trajectory the \
+         last sample is \
+         held. S2's inverse is unstable (its zero lies outside of the unit circle), so that Insight 1b refuses it: rounding \
+         errors grow as 1.002 \
          to the power of the sample, whatever computes the law.",
     );
 }

@@ -72,8 +72,10 @@ pub(super) fn add(study: &mut Study, networks: &OfMinimumPhase) {
     study.note(
         SECTION,
         &format!(
-            "State features see what an initial error or a disturbance did to the state and correct it within r samples of {PERIOD} s; what acts \
-             within those r samples remains (here the whole of {DISTURBANCE}, as r is 1). Transfer-function features see neither: the error decays \
+            "State features see what an initial error or a disturbance did to the state and correct it within r samples of \
+             {PERIOD} s; what acts \
+             within those r samples remains (here the whole of {DISTURBANCE}, as r is 1). Transfer-function features see \
+             neither: the error decays \
              as the loop's poles let it, and the disturbance passes with the loop's own gain, 16/7."
         ),
     );

@@ -38,9 +38,12 @@ pub(super) fn add(study: &mut Study, settings: &Settings) -> Result<OfMinimumPha
     of_system(study, &second, settings)?;
     study.note(
         SECTION,
-        "The model error compares the network's reference with the exact law's at the same moments of the same run. S1 is tracked to rounding. \
-         On S2 the network learns its training box (references within 5) just as well, and yet the loop is lost: the exact reference for \
-         the test leaves that box, because the inverse is unstable. A small model error beside a lost loop is what the paper found.",
+        "The model error compares the network's reference with the exact law's at the same moments of the same run. S1 is \
+         tracked to rounding. \
+         On S2 the network learns its training box (references within 5) just as well, and yet the loop is lost: the exact \
+         reference for \
+         the test leaves that box, because the inverse is unstable. A small model error beside a lost loop is what the paper \
+         found.",
     );
     Ok(learned)
 }

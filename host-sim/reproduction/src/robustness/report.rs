@@ -33,27 +33,33 @@ type Margin = (&'static str, fn(&Design) -> f32);
 /// What the study does, in words.
 pub(super) fn explain(study: &mut Study, settings: &Settings) {
     let text = format!(
-        "Models of the nominal vehicle, {} strokes that nobody trained on. Vehicle, loop and air differ in the test flights only: the \
+        "Models of the nominal vehicle, {} strokes that nobody trained on. Vehicle, loop and air differ in the test flights \
+         only: the \
          flight stack knows nothing of it, and reductions are against the baseline's flight of the same vehicle in the same air.",
         settings.strokes
     );
     study.note(CASE_SECTION, &text);
     study.note(
         CASE_SECTION,
-        "Drag x4 needs corrections larger than the fast part of the feedback lane may give where errors are large already (its clamp, halved at an \
-         error of the lane's scale, 0.1 m); in some of these flights the guard hands a lane over besides. Wider clamps are choices of the recipe: they cost \
+        "Drag x4 needs corrections larger than the fast part of the feedback lane may give where errors are large already (its \
+         clamp, halved at an \
+         error of the lane's scale, 0.1 m); in some of these flights the guard hands a lane over besides. Wider clamps are \
+         choices of the recipe: they cost \
          robustness against delay on some vehicles, which the validation flights tell.",
     );
     study.note(
         DEVIATION_SECTION,
-        "One quantity off at a time. Mass and thrust leave a sag that the network lane cannot know of; the integral of the feedback lane takes it \
-         away as long as it is within its clamp. Wind blows along both horizontal axes, with Dryden gusts of its own strength on top.",
+        "One quantity off at a time. Mass and thrust leave a sag that the network lane cannot know of; the integral of the \
+         feedback lane takes it \
+         away as long as it is within its clamp. Wind blows along both horizontal axes, with Dryden gusts of its own strength \
+         on top.",
     );
     let ranges = &settings.ranges;
     study.note(
         super::spread::SECTION,
         &format!(
-            "{} vehicles a loop, each with {} strokes, drawn uniformly: mass x{:?}, thrust x{:?}, drag x{:?}, inertia x{:?}, motor lag x{:?}, \
+            "{} vehicles a loop, each with {} strokes, drawn uniformly: mass x{:?}, thrust x{:?}, drag x{:?}, inertia x{:?}, \
+             motor lag x{:?}, \
              {:?} s of further delay, wind of {:?} m/s from any side, all at once.",
             settings.draws,
             settings.draw_strokes,
@@ -68,8 +74,10 @@ pub(super) fn explain(study: &mut Study, settings: &Settings) {
     );
     study.note(
         CONTROL_WEIGHT_SECTION,
-        "Each point is a lane designed at another control weight from the same logs, flown without the guard. The limit knows plant, noise and disturbance \
-         exactly and has the network's errors not to mend: it is what the error would be if only noise and disturbance were left.",
+        "Each point is a lane designed at another control weight from the same logs, flown without the guard. The limit knows \
+         plant, noise and disturbance \
+         exactly and has the network's errors not to mend: it is what the error would be if only noise and disturbance were \
+         left.",
     );
 }
 

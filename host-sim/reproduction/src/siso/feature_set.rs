@@ -135,7 +135,8 @@ mod tests {
     proptest! {
         #[test]
         fn the_firmware_evaluates_the_same_features_to_the_same_bits(
-            state in proptest::collection::vec(-9.0..9.0f32, 2), past in proptest::collection::vec(-9.0..9.0f32, 6), phase in 0.0..6.0f32
+            state in proptest::collection::vec(-9.0..9.0f32, 2), past in proptest::collection::vec(-9.0..9.0f32, 6),
+            phase in 0.0..6.0f32
         ) {
             let desired = |sample: i64| phase + (sample * sample) as f32 * 0.3;
             let moment = Moment { sample: 6, state: &state, references: &past, desired: &desired };
@@ -149,7 +150,9 @@ mod tests {
         }
 
         #[test]
-        fn difference_learning_is_translation_invariant(shift in -50.0..50.0f64, velocity in -2.0..2.0f64, position in -3.0..3.0f64) {
+        fn difference_learning_is_translation_invariant(
+            shift in -50.0..50.0f64, velocity in -2.0..2.0f64, position in -3.0..3.0f64
+        ) {
             let set = FeatureSet::state_space(2, 2).difference();
             let plain = |sample: i64| 0.1 * sample as f64;
             let shifted = |sample: i64| plain(sample) + shift;

@@ -69,7 +69,8 @@ pub enum TrajectoryError {
     },
     /// A segment that does not begin where the one before ends.
     #[error(
-        "{file}, line {line}, field `{field}`: the segment begins {jump:.4} {unit} away from the end of the one before; at most {tolerance} {unit} are allowed"
+        "{file}, line {line}, field `{field}`: the segment begins {jump:.4} {unit} away from the end of the one before; at most \
+         {tolerance} {unit} are allowed"
     )]
     Join {
         /// File as given.

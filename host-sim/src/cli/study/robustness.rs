@@ -26,8 +26,10 @@ use crate::cli::{
 /// Arguments of `study robustness`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-A model is built for each vehicle and condition and flown with mass, thrust, drag, delay, disturbance and wind that it was not made for, one at a
-time and, in the Monte Carlo run, all at once; then the control weight of the feedback lane is swept. The draws are kept in the folder
+A model is built for each vehicle and condition and flown with mass, thrust, drag, delay, disturbance and wind that it was not \
+made for, one at a
+time and, in the Monte Carlo run, all at once; then the control weight of the feedback lane is swept. The draws are kept in the \
+folder
 (draws-*.jsonl): the same command goes on with them.
 
 Examples:
@@ -102,7 +104,8 @@ impl Robustness {
 /// Arguments of `study draws`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Each draw is another vehicle in another air, flown with the model of the nominal one. A line of JSON for each goes to a file in the folder; the
+Each draw is another vehicle in another air, flown with the model of the nominal one. A line of JSON for each goes to a file in \
+the folder; the
 same command goes on where it stopped. With --shard a run is shared out, by hand or by a scheduler (SLURM: sbatch --array=1-16):
 
   host-sim study draws --model model.impromptu --draws 10000 --shard $SLURM_ARRAY_TASK_ID/16 --out draws
@@ -152,7 +155,8 @@ impl Draws {
 /// Arguments of `study merge`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Checks that the files are all parts of one run, each once and whole, and writes draws-VEHICLE_GAINS_CONDITION.jsonl: the bytes of a run without --shard.")]
+Checks that the files are all parts of one run, each once and whole, and writes draws-VEHICLE_GAINS_CONDITION.jsonl: the bytes \
+of a run without --shard.")]
 pub(super) struct Merge {
     /// Files of `study draws --shard`.
     #[arg(value_name = "FILE", required = true)]

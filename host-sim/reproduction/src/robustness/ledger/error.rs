@@ -24,7 +24,8 @@ pub enum LedgerError {
         reason: String,
     },
     /// Draws of another run.
-    #[error("{}: `{key}` is {found} there and {wanted} here; draws of different runs do not mix: give another --out or the same settings", file.display())]
+    #[error("{}: `{key}` is {found} there and {wanted} here; draws of different runs do not mix: give another --out or the same \
+    settings", file.display())]
     Settings {
         /// The file.
         file: PathBuf,
@@ -54,7 +55,8 @@ pub enum LedgerError {
         missing: String,
     },
     /// A part that was not flown to its end.
-    #[error("{}: part {part} of {of} holds {found} of its {wanted} draws; the same command with --shard {part}/{of} goes on with it", file.display())]
+    #[error("{}: part {part} of {of} holds {found} of its {wanted} draws; the same command with --shard {part}/{of} goes on \
+    with it", file.display())]
     Incomplete {
         /// The file.
         file: PathBuf,
