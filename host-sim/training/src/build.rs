@@ -1,25 +1,24 @@
-//! From a loop to its models: collect, learn, design the lane, export.
+//! From a loop to its models: fly, train, and train what the models are compared with.
+//!
+//! *in* a recipe and a simulated loop; *out* model files: the network in two number formats, the ridge regression, the flatness feed-forward;
+//! *never* a comparison that has fewer lanes than the model; *source* Zhou 2017, sections III and V.
 
-use impromptu_firmware::{adapter::Lanes, model::Model};
-use impromptu_model_export::{
-    Description, ExportError, FloatNetwork, Precision,
-    description::{LaneDescription, MonitorDescription},
-    encode,
-};
+use impromptu_model_export::{Description, ExportError, Precision, description::LaneDescription};
 use impromptu_sim::{
     flight_log::FlightLog,
-    flights::{FlightsError, Loop, reduction},
-    trajectory::{Trajectory, strokes},
+    flights::{FlightsError, Loop},
 };
 
 use crate::{
     error::BuildError,
-    lane::{LaneChoice, LaneRefusal, choose_lane, dithered_logs, strongest_lane},
-    learn::{Candidates, Learned, Rows, learn},
-    models::{FromFlights, ModelSet, describe, feedforward},
-    monitor::{monitor, promise},
+    lane::{LaneChoice, LaneRefusal, dithered_logs, strongest_lane},
+    learn::Learned,
+    models::feedforward,
+    pipeline::{Pipeline, Trained, with_monitor},
+    purpose::{Purpose, derived},
     recipe::{LaneRecipe, Recipe},
     supervised::Progress,
+    validation::Validation,
 };
 
 /// Everything that was built for a loop.
@@ -35,170 +34,83 @@ pub struct Built {
     pub models: ModelSet,
 }
 
-/// What a random number is for: training, validation and test never share a seed.
-#[derive(Clone, Copy, Debug)]
-pub enum Purpose {
-    /// Training flights.
-    Training = 1,
-    /// Flights with dither.
-    Identification = 2,
-    /// Validation strokes and flights.
-    Validation = 3,
-    /// Test strokes and flights.
-    Test = 4,
-}
-
-/// The seed of a purpose (SplitMix64's finaliser).
-pub fn derived(seed: u64, purpose: Purpose) -> u64 {
-    let mut mixed = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add((purpose as u64) << 56);
-    mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    mixed ^ (mixed >> 31)
+/// The models that an experiment compares, as the bytes of model files.
+#[derive(Clone, Debug)]
+pub struct ModelSet {
+    /// Flatness feed-forward.
+    pub feedforward: Vec<u8>,
+    /// Ridge regression.
+    pub ridge: Vec<u8>,
+    /// Network, f32.
+    pub float: Vec<u8>,
+    /// Network, int8.
+    pub int8: Vec<u8>,
+    /// What the int8 file says of itself.
+    pub description: Description,
 }
 
 /// Logs of the recipe's training flights.
 ///
 /// # Errors
 /// If they cannot be flown.
-pub fn training_logs(recipe: &Recipe, plant: &Loop, seed: u64) -> Result<Vec<FlightLog>, FlightsError> {
+pub fn training_logs(recipe: &Recipe, closed_loop: &Loop, seed: u64) -> Result<Vec<FlightLog>, FlightsError> {
     let mut first = derived(seed, Purpose::Training);
     let mut logs = Vec::new();
     for excitation in &recipe.excitations {
-        logs.extend(plant.collect(&excitation.motions(first), None, first)?);
+        logs.extend(closed_loop.collect(&excitation.motions(first), None, first)?);
         first = first.wrapping_add(u64::from(excitation.flights));
     }
     Ok(logs)
-}
-
-/// Validation strokes at each of the recipe's speeds.
-///
-/// # Errors
-/// If they cannot be sampled.
-pub fn validation_strokes(recipe: &Recipe, speeds: &[f64], rate_hz: f64, seed: u64) -> Result<Vec<Trajectory>, FlightsError> {
-    let seed = derived(seed, Purpose::Validation);
-    let mut trajectories = Vec::new();
-    for &speed in speeds {
-        trajectories.extend(strokes(seed, recipe.validation_strokes, speed, rate_hz)?);
-    }
-    Ok(trajectories)
-}
-
-/// Smoothing of logs under a condition: none where there is no noise.
-pub fn smoothing(recipe: &Recipe, plant: &Loop) -> f64 {
-    if plant.condition.noise.position > 0.0 || plant.condition.noise.velocity > 0.0 { recipe.smoothing_s } else { 0.0 }
 }
 
 /// Builds the models of a loop. The same seed gives the same bytes.
 ///
 /// # Errors
 /// If flights or learning fail; a refused feedback lane is no error.
-pub fn build(recipe: &Recipe, plant: &Loop, seed: u64, progress: &mut dyn FnMut(Progress)) -> Result<Built, BuildError> {
-    let delay = plant.condition.measurement_delay_s;
-    let mut recipe = recipe.clone();
-    recipe.network.seed = seed;
-    recipe.fine_tuning.seed = seed;
-    let logs = training_logs(&recipe, plant, seed)?;
-    let validation = validation_strokes(&recipe, &recipe.validation_speeds, plant.rate_hz(), seed)?;
-    let flight_seed = derived(seed, Purpose::Validation);
-    let judge =
-        |candidates: Candidates<'_>, rows: &Rows| Ok(best_in_flight(&recipe, plant, &validation, flight_seed, candidates, rows)?);
-    let learned = learn(&recipe, &logs, delay, smoothing(&recipe, plant), Some(&judge), progress)?;
+pub fn build(recipe: &Recipe, closed_loop: &Loop, seed: u64, progress: &mut dyn FnMut(Progress)) -> Result<Built, BuildError> {
+    let name = |what: &str| format!("{}-{}-{}-{what}", closed_loop.vehicle.name, closed_loop.gains, closed_loop.condition.name);
+    let pipeline = Pipeline::simulated(recipe, closed_loop, seed)?;
+    let logs = training_logs(recipe, closed_loop, seed)?;
+    let learned = pipeline.learn(&logs, progress)?;
     drop(logs);
+    let dithered = dithered_logs(&recipe.lane, closed_loop, derived(seed, Purpose::Identification))?;
+    let trained = pipeline.complete(&learned, &dithered, &name("net_int8"), None)?;
+    let (feedforward_lane, feedforward) =
+        comparison(&pipeline, closed_loop, &learned, &dithered, &trained, &name("feedforward"))?;
 
-    let dithered = dithered_logs(&recipe.lane, plant, derived(seed, Purpose::Identification))?;
-    let describe = |lane: Option<&LaneDescription>| describe(&recipe, plant, &learned.rows, lane, "candidate", "", seed);
-    let lane = choose_lane(&recipe, plant, &dithered, &validation, flight_seed, &|lane| {
-        encode(&describe(Some(lane)), Some(&learned.quantised), Precision::Int8, &learned.rows.calibration)
-    });
-
-    // The feed-forward leaves larger errors, for which the network's lane would be unfairly weak.
-    let wide = LaneRecipe { fast_limits: vec![0.1, 0.3], authority_scales: vec![1e3], error_scale: 0.2, ..recipe.lane.clone() };
-    let nominal = validation_strokes(&recipe, &[1.0], plant.rate_hz(), seed)?;
-    let feedforward_lane = strongest_lane(&wide, plant, &dithered, &nominal, flight_seed, &|lane| {
-        feedforward(&plant.settings, describe(Some(lane)))
-    })
-    .ok();
-
-    let remarks = match &lane {
-        Ok(choice) => format!("feedback lane: {}", choice.design),
-        Err(reason) => format!("no feedback lane: {reason}"),
+    let Trained { lane, description, model } = trained;
+    let beside = |what: &str, network| -> Result<Vec<u8>, ExportError> {
+        let description = Description { name: name(what), ..description.clone() };
+        learned.encode_as(&description, network, Precision::Float, learned.labels.bypass())
     };
-    let monitor = monitor(&recipe, &dithered).ok();
-    let from_flights = |lane: Option<&LaneDescription>, validation: &[Trajectory], encode: &Encode<'_>| {
-        let promised = |monitor: &MonitorDescription| {
-            let model = encode(describe(lane))?;
-            Ok::<_, BuildError>(MonitorDescription {
-                validated_rms: promise(plant, validation, &model, flight_seed)?,
-                ..monitor.clone()
-            })
-        };
-        Ok::<_, BuildError>(FromFlights { lane: lane.cloned(), monitor: monitor.as_ref().map(promised).transpose()? })
+    let models = ModelSet {
+        feedforward,
+        ridge: beside("ridge", &learned.ridge)?,
+        float: beside("net_f32", &learned.network)?,
+        int8: model,
+        description,
     };
-    let own = from_flights(lane.as_ref().ok().map(|choice| &choice.lane), &validation, &|description| {
-        encode(&description, Some(&learned.quantised), Precision::Int8, &learned.rows.calibration)
-    })?;
-    let of_feedforward = from_flights(feedforward_lane.as_ref().map(|choice| &choice.lane), &nominal, &|description| {
-        feedforward(&plant.settings, description)
-    })?;
-    let models = ModelSet::new(&recipe, plant, &learned, &own, &of_feedforward, &remarks, seed)?;
     Ok(Built { learned, lane, feedforward_lane, models })
 }
 
-/// Makes a model file of a description.
-type Encode<'a> = dyn Fn(Description) -> Result<Vec<u8>, ExportError> + 'a;
-
-/// Further delay of the whole loop in one of the flights by which networks are chosen, s.
-const LATE_S: f64 = 0.02;
-/// A network may be this much worse than the ridge regression in any kind of validation flight, points.
-const LOSS_AGAINST_RIDGE: f64 = 0.1;
-
-/// The candidate with the best mean reduction over the validation flights, nominal and late, each speed by itself; first come those
-/// that are nowhere worse than the ridge regression on the same features.
-///
-/// # Errors
-/// If a candidate cannot be encoded or flown.
-pub fn best_in_flight(
-    recipe: &Recipe,
-    plant: &Loop,
-    validation: &[Trajectory],
-    seed: u64,
-    candidates: Candidates<'_>,
-    rows: &Rows,
-) -> Result<usize, BuildError> {
-    let lanes = Lanes { network: true, feedback: false };
-    let plant = &plant.unguarded();
-    let late = plant.delayed(LATE_S);
-    let kinds: Vec<(&Loop, &[Trajectory])> = [plant, &late]
-        .into_iter()
-        .flat_map(|plant| validation.chunks(recipe.validation_strokes.max(1)).map(move |trajectories| (plant, trajectories)))
-        .collect();
-    let baselines: Vec<Vec<f64>> = kinds
-        .iter()
-        .map(|(plant, trajectories)| plant.errors(trajectories, None, 1.0, seed))
-        .collect::<Result<_, _>>()
-        .map_err(FlightsError::from)?;
-    let fly = |network: &FloatNetwork, precision| -> Result<Vec<f64>, BuildError> {
-        let description = describe(recipe, plant, rows, None, "candidate", "", seed);
-        let bytes = encode(&description, Some(network), precision, &rows.calibration)?;
-        let model = Model::from_bytes(&bytes).map_err(ExportError::Refused)?;
-        kinds
-            .iter()
-            .zip(&baselines)
-            .map(|((plant, trajectories), baseline)| {
-                let errors = plant.errors(trajectories, Some((&model, lanes)), 1.0, seed).map_err(FlightsError::from)?;
-                Ok(reduction(baseline, &errors).0)
-            })
-            .collect()
-    };
-    let bar = fly(candidates.ridge, Precision::Float)?;
-    let mut best = (false, f64::NEG_INFINITY, 0);
-    for (index, candidate) in candidates.networks.iter().enumerate() {
-        let found = fly(candidate, candidates.precision)?;
-        let harmless = found.iter().zip(&bar).all(|(network, ridge)| *network >= ridge - LOSS_AGAINST_RIDGE);
-        let mean = found.iter().sum::<f64>() / found.len().max(1) as f64;
-        if (harmless, mean) > (best.0, best.1) {
-            best = (harmless, mean, index);
-        }
-    }
-    Ok(best.2)
+/// The flatness feed-forward with a feedback lane and a monitor of its own, if there are any.
+fn comparison(
+    pipeline: &Pipeline<'_>,
+    closed_loop: &Loop,
+    learned: &Learned,
+    dithered: &[FlightLog],
+    trained: &Trained,
+    name: &str,
+) -> Result<(Option<LaneChoice>, Vec<u8>), BuildError> {
+    let (recipe, seed) = (&pipeline.settings.recipe, pipeline.settings.seed);
+    let encode = |description: &Description| feedforward(&closed_loop.settings, description.clone());
+    // The feed-forward leaves larger errors, for which the network's lane would be unfairly weak.
+    let wide = LaneRecipe { fast_limits: vec![0.1, 0.3], authority_scales: vec![1e3], error_scale: 0.2, ..recipe.lane.clone() };
+    let nominal = Validation::strokes(recipe, closed_loop, &[1.0], seed)?;
+    let remarks = &trained.description.provenance.remarks;
+    let describe = |lane: Option<&LaneDescription>| pipeline.describe(learned, lane, name, remarks);
+    let lane = strongest_lane(&wide, &nominal, dithered, &|lane| encode(&describe(Some(lane)))).ok();
+    let description = describe(lane.as_ref().map(|choice| &choice.lane));
+    let (_, model) = with_monitor(&nominal, description, trained.description.monitor.clone(), &encode)?;
+    Ok((lane, model))
 }

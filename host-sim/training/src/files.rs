@@ -37,7 +37,7 @@ pub fn write_model_files(
     description: &Description,
     model: &[u8],
 ) -> Result<Vec<PathBuf>> {
-    let network = learned.quantised.to_bytes().context("network")?;
+    let network = learned.exported.to_bytes().context("network")?;
     let rows = rows(learned, description)?;
     let description = description.to_json();
     let contents: [(&str, &[u8]); 4] =

@@ -18,13 +18,13 @@ use impromptu_sim::{
     flight_log::FlightLog,
     flights::{FlightsError, Loop},
     rollout::{Dither, RolloutError},
-    trajectory::Trajectory,
 };
 use rayon::prelude::*;
 
 use crate::{
     feedback_design::{AxisLog, DesignRefusal, DesignSettings, IdentificationData, LaneDesign, design},
     recipe::{LaneRecipe, Recipe},
+    validation::Validation,
 };
 
 /// Why a model is written without a feedback lane.
@@ -48,6 +48,9 @@ pub enum LaneRefusal {
         /// The case in which that was.
         case: String,
     },
+    /// Nothing flies that could judge the designs.
+    #[error("it is chosen by simulated flights, and no vehicle was given; give --vehicle")]
+    NoFlights,
     /// Flights could not be flown.
     #[error(transparent)]
     Rollout(#[from] FlightsError),
@@ -257,16 +260,15 @@ struct Score {
 /// All designs of a recipe from dithered logs, and how each flew over the validation trajectories in every case.
 fn flown(
     recipe: &LaneRecipe,
-    plant: &Loop,
+    validation: &Validation<'_>,
     logs: &[FlightLog],
-    validation: &[Trajectory],
-    seed: u64,
     encode: &(dyn Fn(&LaneDescription) -> Result<Vec<u8>, ExportError> + Sync),
 ) -> Result<(Vec<Candidate>, Vec<Score>), LaneRefusal> {
     let candidates = candidates(recipe, logs)?;
     let cases = &CASES;
     // What a lane does by itself is judged, not what the guard makes of it.
-    let plant = &plant.unguarded();
+    let Validation { closed_loop, trajectories: validation, seed } = validation;
+    let (plant, seed) = (&closed_loop.unguarded(), *seed);
     let loops: Vec<Loop> = cases.iter().map(|case| plant.delayed(case.delay_s)).collect();
     let baselines: Vec<Vec<f64>> =
         loops.iter().map(|plant| plant.errors(validation, None, 1.0, seed)).collect::<Result<_, _>>()?;
@@ -321,20 +323,26 @@ fn worst_to_answer_for(baseline: &[f64], network_alone: &[f64], errors: &[f64]) 
 const LOSS_AGAINST_NETWORK: f64 = 1.0;
 const LOSS_SHARE: f64 = 0.2;
 
-/// Designs lanes from dithered `logs` and chooses one by flights over the `validation` trajectories. `encode` makes a
+/// What a model remarks of its feedback lane, or of why it has none.
+pub fn in_words(lane: &Result<LaneChoice, LaneRefusal>) -> String {
+    match lane {
+        Ok(choice) => format!("feedback lane: {}", choice.design),
+        Err(reason) => format!("no feedback lane: {reason}"),
+    }
+}
+
+/// Designs lanes from dithered `logs` and chooses one by `validation` flights. `encode` makes a
 /// model file with a lane; the network lane flies too.
 ///
 /// # Errors
 /// With the reason why there is no lane.
 pub fn choose_lane(
     recipe: &Recipe,
-    plant: &Loop,
+    validation: &Validation<'_>,
     logs: &[FlightLog],
-    validation: &[Trajectory],
-    seed: u64,
     encode: &(dyn Fn(&LaneDescription) -> Result<Vec<u8>, ExportError> + Sync),
 ) -> Result<LaneChoice, LaneRefusal> {
-    let (candidates, scores) = flown(&recipe.lane, plant, logs, validation, seed, encode)?;
+    let (candidates, scores) = flown(&recipe.lane, validation, logs, encode)?;
     let admissible = |score: &Score| score.worst >= 0.0;
     if let Some(choice) = best(&candidates, &scores, &admissible) {
         return Ok(choice);
@@ -353,13 +361,11 @@ pub fn choose_lane(
 /// If there is no design at all.
 pub fn strongest_lane(
     recipe: &LaneRecipe,
-    plant: &Loop,
+    validation: &Validation<'_>,
     logs: &[FlightLog],
-    validation: &[Trajectory],
-    seed: u64,
     encode: &(dyn Fn(&LaneDescription) -> Result<Vec<u8>, ExportError> + Sync),
 ) -> Result<LaneChoice, LaneRefusal> {
-    let (candidates, scores) = flown(recipe, plant, logs, validation, seed, encode)?;
+    let (candidates, scores) = flown(recipe, validation, logs, encode)?;
     best(&candidates, &scores, &|_| true).ok_or(LaneRefusal::Flights {
         designs: 0,
         worst: f64::NEG_INFINITY,

@@ -8,17 +8,14 @@ use impromptu_model_export::{
     ExportError,
     description::{MonitorAxisDescription, MonitorDescription},
 };
-use impromptu_sim::{
-    flight_log::FlightLog,
-    flights::{FlightsError, Loop},
-    trajectory::Trajectory,
-};
+use impromptu_sim::{flight_log::FlightLog, flights::FlightsError};
 
 use crate::{
     error::BuildError,
     feedback_design::{IdentificationData, response::box_responses},
     lane::{LaneRefusal, identification},
     recipe::Recipe,
+    validation::Validation,
 };
 
 /// Reference ticks in a monitor tick: 50 ms at 100 Hz.
@@ -56,9 +53,10 @@ pub fn monitor(recipe: &Recipe, logs: &[FlightLog]) -> Result<MonitorDescription
 ///
 /// # Errors
 /// If the model is refused or does not fit the flight stack.
-pub fn promise(plant: &Loop, validation: &[Trajectory], model: &[u8], seed: u64) -> Result<f32, BuildError> {
+pub fn promise(validation: &Validation<'_>, model: &[u8]) -> Result<f32, BuildError> {
     let model = Model::from_bytes(model).map_err(ExportError::Refused)?;
-    let errors = plant.unguarded().errors(validation, Some((&model, Lanes::BOTH)), 1.0, seed);
+    let Validation { closed_loop, trajectories, seed } = validation;
+    let errors = closed_loop.unguarded().errors(trajectories, Some((&model, Lanes::BOTH)), 1.0, *seed);
     let mut errors = errors.map_err(FlightsError::from)?;
     errors.sort_by(f64::total_cmp);
     Ok(errors.get(errors.len() / 2).copied().unwrap_or(0.0) as f32)

@@ -17,7 +17,7 @@ use impromptu_sim::{
     rollout::{FlightPlan, fly_on},
     trajectory::{Sample, Trajectory},
 };
-use impromptu_training::{Purpose, derived};
+use impromptu_training::{Labels, Purpose, derived};
 use rayon::prelude::*;
 
 use super::{
@@ -107,7 +107,7 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> 
     let learned: Vec<Vec<Flown>> = lists()
         .into_par_iter()
         .map(|(name, words, list)| {
-            let learned = learn(&ground.recipe(list), &ground.plant, &logs, true)?;
+            let learned = learn(&ground.recipe(list), &ground.plant, &logs, Labels::Corrections)?;
             let network = fly(ground, &steps, Some(&learned.network_file(&ground.plant)?))?;
             let ridge = fly(ground, &steps, Some(&learned.ridge_file(&ground.plant)?))?;
             Ok(vec![(name.to_owned(), words.to_owned(), network), (format!("{name}_ridge"), format!("{words}, ridge"), ridge)])
