@@ -223,9 +223,12 @@ crates() {
     tests/packages.sh
 }
 
+# Those of the reproduction are whole studies, which take minutes.
 unit_tests() {
     say "unit tests"
-    cargo test --workspace --lib --bins --locked --profile checked
+    cargo test --workspace --exclude impromptu-reproduction --lib --bins --locked --profile checked
+    say "lines, files, packages"
+    cargo test --package impromptu-tests --test tidy --locked --profile checked
 }
 
 all_tests() {

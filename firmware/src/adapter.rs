@@ -129,12 +129,6 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.restart();
     }
 
-    /// Forgets the model too: no correction, and no job any more.
-    pub fn unload(&mut self) {
-        self.model = None;
-        self.restart();
-    }
-
     /// Takes the model away, in place: from now on the reference is the desired one of an application whose signals are `table`.
     ///
     /// # Errors

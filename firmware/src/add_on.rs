@@ -1,14 +1,14 @@
 //! The whole add-on of one loop: the adapter, and the desired trajectory ahead of it.
 //!
-//! *in* desired channels, pushed ahead of time, and what is measured at each reference tick; *out* the reference that the loop shall track,
-//! and a [`Report`]; *never* a number in the trajectory that is not finite, an allocation, or a clock of its own; without a model no other
-//! reference than the desired one, to the bit; *source* Zhou 2017, Fig. 1.
+//! *in* desired channels, pushed ahead of time, and what is measured at each reference tick; *out* the reference that the loop
+//! shall track, and a [`Report`]; *never* a number in the trajectory that is not finite, an allocation, or a clock of its own;
+//! without a model no other reference than the desired one, to the bit; *source* Zhou 2017, Fig. 1.
 //!
 //! On a microcontroller it lies in a static, where [`AddOn::load`] fills it in place:
 //!
 //! ```
 //! use impromptu_firmware::{
-//!     add_on::AddOn,
+//!     AddOn,
 //!     model::{Channel, Channels},
 //!     preview::EndRule,
 //! };
@@ -92,11 +92,11 @@ impl Report {
     }
 }
 
-/// The add-on of a loop with `D` desired, `M` measured and `R` reference channels, which keeps `N` samples of the desired trajectory, past
-/// ones included.
+/// The add-on of a loop with `D` desired, `M` measured and `R` reference channels, which keeps `N` samples of the desired
+/// trajectory, past ones included.
 ///
-/// Ticks are those of the loop's references, in order and without gaps; after a gap the histories start anew. A reference tick is one
-/// [`AddOn::step`], or, with the network in a task of lower priority, [`AddOn::begin`] and [`AddOn::finish`].
+/// Ticks are those of the loop's references, in order and without gaps; after a gap the histories start anew. A reference tick is
+/// one [`AddOn::step`], or, with the network in a task of lower priority, [`AddOn::begin`] and [`AddOn::finish`].
 #[derive(Debug)]
 pub struct AddOn<'m, const D: usize, const M: usize, const R: usize, const N: usize> {
     adapter: Adapter<'m, D, M, R>,
@@ -110,8 +110,8 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
         Self { adapter: Adapter::empty(), preview: Preview::new([EndRule::Hold; D], 0) }
     }
 
-    /// An add-on with a model for a loop with these signals, whose references run at `rate_hz`, Hz. Both lanes are off; the first sample
-    /// of the trajectory will be that of tick 0.
+    /// An add-on with a model for a loop with these signals, whose references run at `rate_hz`, Hz. Both lanes are off; the first
+    /// sample of the trajectory will be that of tick 0.
     ///
     /// # Errors
     /// As [`AddOn::check`].
@@ -141,11 +141,12 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
         Ok(())
     }
 
-    /// An add-on without a model, in place: from now on the reference is the desired one. The trajectory is forgotten, its next sample will
-    /// be that of tick 0.
+    /// An add-on without a model, in place: from now on the reference is the desired one. The trajectory is forgotten, its next
+    /// sample will be that of tick 0.
     ///
     /// # Errors
-    /// If there are more channels than `D`, `M` or `R`, or a reference channel has the name of no desired one; then nothing changes.
+    /// If there are more channels than `D`, `M` or `R`, or a reference channel has the name of no desired one; then nothing
+    /// changes.
     pub fn bypass<'t>(&mut self, signals: impl Into<Channels<'t>>) -> Result<(), Refusal> {
         let signals = signals.into();
         self.adapter.bypass(&signals)?;
@@ -181,32 +182,40 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
         self.preview.sample(tick)
     }
 
-    /// Forgets the trajectory, for another one: the next sample will be that of `first_tick`. All else stays, also what was measured: for
-    /// a jump of the trajectory on the way.
-    pub fn restart(&mut self, first_tick: i32) {
+    /// Forgets the trajectory, for another one: the next sample will be that of `first_tick`. All else stays, also what was
+    /// measured: for a jump of the trajectory on the way.
+    pub fn clear(&mut self, first_tick: i32) {
         self.preview.clear(first_tick);
     }
 
-    /// Forgets the trajectory and everything that was measured and corrected, but for the lanes that are wanted, which fade in again, and
-    /// the counts: for a loop that was at rest. The next sample will be that of `first_tick`.
+    /// Forgets the trajectory and everything that was measured and corrected, but for the counts and the lanes that are wanted,
+    /// which fade in again: for a loop that was at rest. The next sample will be that of `first_tick`.
     pub fn reset(&mut self, first_tick: i32) {
         self.preview.clear(first_tick);
         self.adapter.reset();
     }
 
-    /// Switches lanes; they fade in and out over the model's fade time. Both off and faded out: the reference is the desired one, to
-    /// the bit.
+    /// Forgets everything but the model, the signals and the guard's settings: as when the model came, with both lanes off. The
+    /// next sample will be that of `first_tick`.
+    pub fn restart(&mut self, first_tick: i32) {
+        self.preview.clear(first_tick);
+        self.adapter.restart();
+    }
+
+    /// Switches lanes; they fade in and out over the model's fade time. Both off and faded out: the reference is the desired one,
+    /// to the bit.
     pub fn switch(&mut self, lanes: Lanes) {
         self.adapter.switch(lanes);
     }
 
-    /// Gives inferences time until the next reference tick, for a network in a task of lower priority; once, after the model came.
+    /// Gives inferences time until the next reference tick, for a network in a task of lower priority; once, after the model
+    /// came.
     pub fn defer(&mut self) {
         self.adapter.defer();
     }
 
-    /// One reference tick, the network included: takes what is measured and gives the reference that the loop shall track. The scratch
-    /// needs [`Network::scratch_words`](crate::network::Network::scratch_words).
+    /// One reference tick, the network included: takes what is measured and gives the reference that the loop shall track. The
+    /// scratch needs [`Network::scratch_words`](crate::network::Network::scratch_words).
     pub fn step<const S: usize>(&mut self, tick: i32, measured: &[f32; M], scratch: &mut Scratch<S>) -> [f32; R] {
         self.adapter.step(tick, &self.preview, measured, scratch)
     }
@@ -256,14 +265,9 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
         self.adapter.set_age(ticks);
     }
 
-    /// The adapter.
-    pub fn adapter(&self) -> &Adapter<'m, D, M, R> {
-        &self.adapter
-    }
-
-    /// The adapter, for whoever does more with it than a whole add-on does.
-    pub fn adapter_mut(&mut self) -> &mut Adapter<'m, D, M, R> {
-        &mut self.adapter
+    /// Adapter and trajectory, for whoever does more with them than a whole add-on does.
+    pub fn parts(&mut self) -> (&mut Adapter<'m, D, M, R>, &mut Preview<D, N>) {
+        (&mut self.adapter, &mut self.preview)
     }
 }
 

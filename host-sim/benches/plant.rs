@@ -8,7 +8,7 @@ use std::hint::black_box;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use impromptu_sim::{
     condition::Condition,
-    plant::{Disturbance, GRAVITY, LANES, Plant, State, States, Variation, Vehicle},
+    plant::{BATCH, Disturbance, GRAVITY, Plant, State, States, Variation, Vehicle},
     rollout::{self, FlightPlan},
     trajectory::Trajectory,
 };
@@ -21,15 +21,15 @@ const RESTART: usize = 100;
 
 fn plant(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("plant");
-    group.throughput(Throughput::Elements((LANES * RESTART) as u64));
+    group.throughput(Throughput::Elements((BATCH * RESTART) as u64));
     for name in Vehicle::names() {
         let vehicle = Vehicle::named(name).expect("a built-in vehicle");
-        let plant = Plant::new(&vehicle, [Variation::default(); LANES]);
+        let plant = Plant::new(&vehicle, [Variation::default(); BATCH]);
         let hover = (vehicle.mass * GRAVITY / (4.0 * vehicle.thrust_coefficient)).sqrt();
         let start = States::splat(&State { velocity: [1.0, 0.5, 0.2], rotor_speeds: [hover; 4], ..State::at_rest([0.0; 3]) });
-        let commands = [1.0, 1.001, 1.0, 0.999].map(|factor| [factor * hover; LANES]);
+        let commands = [1.0, 1.001, 1.0, 0.999].map(|factor| [factor * hover; BATCH]);
         let mut disturbance = Disturbance::default();
-        disturbance.set_lane(0, [1.0, 0.0, 0.0], [0.05, 0.0, 0.0]);
+        disturbance.set_member(0, [1.0, 0.0, 0.0], [0.05, 0.0, 0.0]);
         group.bench_function(BenchmarkId::new("step of 8 flights", name), |bencher| {
             bencher.iter(|| {
                 let mut states = start;
@@ -50,7 +50,7 @@ fn closed_loop(criterion: &mut Criterion) {
     let settings = rollout::settings(&vehicle, "stock").expect("built-in gains");
     let condition = Condition::named("clean").expect("a built-in condition");
     let trajectory = Trajectory::by_name("figure8", 100.0).expect("a built-in trajectory");
-    let plans: Vec<FlightPlan<'_>> = (0..8 * LANES as u64).map(|seed| FlightPlan::new(&trajectory, seed)).collect();
+    let plans: Vec<FlightPlan<'_>> = (0..8 * BATCH as u64).map(|seed| FlightPlan::new(&trajectory, seed)).collect();
     let mut group = criterion.benchmark_group("closed loop");
     group.throughput(Throughput::Elements((plans.len() * trajectory.samples.len() * 5) as u64));
     group.sample_size(20);

@@ -84,8 +84,11 @@ fn with_probes(bytes: &[u8]) -> Option<Vec<u8>> {
         probe.extend(outputs.iter().take(layout.axes.len()).flat_map(|output| output.to_le_bytes()));
     }
     blob.resize(blob.len().next_multiple_of(file::ALIGNMENT), 0);
-    card.probes =
-        Probes { count: 0, network: Section::default(), feedback: Section { offset: blob.len() as u32, length: probe.len() as u32 } };
+    card.probes = Probes {
+        count: 0,
+        network: Section::default(),
+        feedback: Section { offset: blob.len() as u32, length: probe.len() as u32 },
+    };
     blob.extend(probe);
     let card = postcard::to_allocvec(&card).ok()?;
     let mut bytes = file::header(card.len() as u32, blob.len() as u32).to_vec();

@@ -1,5 +1,14 @@
 //! What the promises need to be tested: the emulated microcontroller, its cycle model, proofs on its binaries,
-//! C programs, golden texts, bytes for the decoder and the link. The promises themselves are in `tests/`.
+//! C programs, golden texts, bytes for the decoder and the link, the structure of the sources. The promises themselves are in `tests/`.
+//!
+//! | layer | modules | what they hold |
+//! |--:|---|---|
+//! | 1 | `golden` | texts that a run is compared with |
+//! | 1 | `structure` | which file uses which |
+//! | 1 | `decoder`, `link` | bytes for what reads bytes |
+//! | 2 | `elf` | what can be proven of a binary without running it |
+//! | 3 | `board`, `c` | flights on the emulated microcontroller, by Rust and by C |
+//! | 4 | `mcu` | what the kernels cost there |
 
 pub mod board;
 pub mod c;

@@ -157,7 +157,7 @@ fn script(file: &[u8]) -> (Vec<u8>, Vec<u8>) {
                 }
                 tick += 1;
             }
-            Event::Excitation(_) | Event::End { .. } => {}
+            Event::Dither(_) | Event::End { .. } => {}
         }
     }
     assert_eq!(tick, TICKS);

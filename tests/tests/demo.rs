@@ -70,15 +70,15 @@ fn twenty_milliseconds_more_delay_do_no_harm() {
 /// The demo's model on a vehicle and in an air that it was not made for, with the guard.
 #[test]
 fn both_lanes_bear_what_differs_at_test_time_only() {
-    let plant =
+    let closed_loop =
         Loop::new(Vehicle::named("crazyflie").expect("a vehicle"), "stock", Condition::named("lab").expect("a condition"));
-    let plant = plant.expect("a loop");
+    let closed_loop = closed_loop.expect("a loop");
     let file = std::fs::read(models().join("crazyflie-stock-lab-seed1.impromptu")).expect("the demo's model");
     let model = Model::from_bytes(&file).expect("a model");
     let seed = derived(RESULTS.seed, Purpose::Test);
-    let trajectories = strokes(seed, 30, 1.0, plant.rate_hz()).expect("strokes");
+    let trajectories = strokes(seed, 30, 1.0, closed_loop.rate_hz()).expect("strokes");
     for case in CASES {
-        let flown = Comparison::fly(&case.mismatch.applied(&plant), &model, &trajectories, seed).expect("flights");
+        let flown = Comparison::fly(&case.mismatch.applied(&closed_loop), &model, &trajectories, seed).expect("flights");
         let ((mean, worst), (network, _)) = (flown.both_lanes(), flown.network_alone());
         golden::announce(&format!("{}: both lanes {mean:.1} / {worst:.1} %, network {network:.1} %", case.what));
         assert!(mean >= case.asked && worst > 0.0 && mean > network, "{}: {mean} / {worst}, asked {}", case.what, case.asked);
@@ -176,10 +176,10 @@ fn a_flight_of_the_trained_model_has_the_same_bits_on_the_board() {
     let file = std::fs::read(folder().join("models/crazyflie-stock-lab-seed1.impromptu")).expect("the demo's model");
     let model = Model::from_bytes(&file).expect("a model");
     let vehicle = Vehicle::named("crazyflie").expect("a vehicle");
-    let plant = Loop::new(vehicle, "stock", Condition::named("lab").expect("a condition")).expect("a loop");
-    let trajectories = strokes(results.seed + 1000, 1, 1.0, plant.rate_hz()).expect("a stroke");
+    let closed_loop = Loop::new(vehicle, "stock", Condition::named("lab").expect("a condition")).expect("a loop");
+    let trajectories = strokes(results.seed + 1000, 1, 1.0, closed_loop.rate_hz()).expect("a stroke");
     let plan = FlightPlan { record: true, ..FlightPlan::new(&trajectories[0], 5).with(&model, Lanes::BOTH) };
-    let records = plant.fly(&[plan]).expect("a flight");
+    let records = closed_loop.fly(&[plan]).expect("a flight");
     let recorded = records[0].recorded.as_ref().expect("a recording");
     let report = board::fly_again("trained", Some(&file), recorded).expect("the same bits");
     golden::announce(&format!("trained model on the board: {report}"));

@@ -26,7 +26,7 @@ const BAR: f64 = 1.5;
 const SEED: u64 = 77;
 const NETWORK: Lanes = Lanes { network: true, feedback: false };
 
-fn plant(vehicle: &str, condition: &str) -> Loop {
+fn closed_loop(vehicle: &str, condition: &str) -> Loop {
     let vehicle = Vehicle::named(vehicle).expect("a vehicle");
     Loop::new(vehicle, "stock", Condition::named(condition).expect("a condition")).expect("a loop")
 }
@@ -73,7 +73,7 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-fn fly(plant: &Loop, trajectories: &[Trajectory], bytes: &[u8], lanes: Lanes, guard: GuardSettings) -> Outcome {
+fn fly(closed_loop: &Loop, trajectories: &[Trajectory], bytes: &[u8], lanes: Lanes, guard: GuardSettings) -> Outcome {
     let model = Model::from_bytes(bytes).expect("a model");
     let plans = |add_on: Option<Lanes>| -> Vec<FlightPlan<'_>> {
         let plan = |(trajectory, seed)| FlightPlan {
@@ -84,13 +84,14 @@ fn fly(plant: &Loop, trajectories: &[Trajectory], bytes: &[u8], lanes: Lanes, gu
         };
         trajectories.iter().zip(SEED..).map(plan).collect()
     };
-    let (baselines, records) = (plant.fly(&plans(None)).expect("flights"), plant.fly(&plans(Some(lanes))).expect("flights"));
+    let (baselines, records) =
+        (closed_loop.fly(&plans(None)).expect("flights"), closed_loop.fly(&plans(Some(lanes))).expect("flights"));
     let mut outcome = Outcome { flights: records.len(), ..Outcome::default() };
     for (baseline, record) in baselines.iter().zip(&records) {
         outcome.reduction += 100.0 * (1.0 - record.rms / baseline.rms) / records.len() as f64;
         let [before, after] = [baseline, record].map(|record| squares(record.log.as_ref().expect("a log")));
         let whole = mean(&before);
-        let second = plant.rate_hz() as usize;
+        let second = closed_loop.rate_hz() as usize;
         for (before, after) in before.windows(second).zip(after.windows(second)) {
             let ratio = |reference: f64| (mean(after) / reference).sqrt();
             outcome.worst = outcome.worst.max(ratio(whole.max(mean(before))));
@@ -106,8 +107,9 @@ fn fly(plant: &Loop, trajectories: &[Trajectory], bytes: &[u8], lanes: Lanes, gu
 }
 
 /// Flies without and with the guard, prints both, returns the guarded one.
-fn compared(name: &str, plant: &Loop, trajectories: &[Trajectory], bytes: &[u8], lanes: Lanes) -> [Outcome; 2] {
-    let outcomes = [GuardSettings::OFF, GuardSettings::default()].map(|guard| fly(plant, trajectories, bytes, lanes, guard));
+fn compared(name: &str, closed_loop: &Loop, trajectories: &[Trajectory], bytes: &[u8], lanes: Lanes) -> [Outcome; 2] {
+    let outcomes =
+        [GuardSettings::OFF, GuardSettings::default()].map(|guard| fly(closed_loop, trajectories, bytes, lanes, guard));
     for (guard, outcome) in ["unguarded", "guarded"].iter().zip(&outcomes) {
         println!("{name}, {guard}: {outcome:.2?}");
     }
@@ -115,21 +117,21 @@ fn compared(name: &str, plant: &Loop, trajectories: &[Trajectory], bytes: &[u8],
 }
 
 /// Lanes with the noise believed and full authority everywhere, in a loop 20 ms later than their logs: one with a hundredth of
-/// the effort and clamps wide open, whose good flights go astray now and then, and one without any weight on the velocity, as the
+/// the control weight and clamps wide open, whose good flights go astray now and then, and one without any weight on the velocity, as the
 /// pilot's was, which never flies.
 #[test]
 fn an_aggressive_feedback_lane_in_a_late_loop_is_handed_over_in_time() {
-    let plant = plant("crazyflie", "rough");
-    let late = plant.delayed(0.02);
-    let trajectories = strokes(SEED, 12, 1.0, plant.rate_hz()).expect("strokes");
-    let one = strokes(SEED, 1, 1.0, plant.rate_hz()).expect("a stroke");
+    let closed_loop = closed_loop("crazyflie", "rough");
+    let late = closed_loop.delayed(0.02);
+    let trajectories = strokes(SEED, 12, 1.0, closed_loop.rate_hz()).expect("strokes");
+    let one = strokes(SEED, 1, 1.0, closed_loop.rate_hz()).expect("a stroke");
     let recipe = Recipe::default().lane;
-    let logs = dithered_logs(&recipe, &plant, SEED).expect("logs");
+    let logs = dithered_logs(&recipe, &closed_loop, SEED).expect("logs");
     let (description, network) = parts("crazyflie", "rough");
     let model = |description: &Description| encode(description, Some(&network), Precision::Float, &[]);
-    for (effort, velocity_weight, fast_limit) in [(3e-5, 0.05, 0.3), (3e-4, 0.0, 0.1)] {
+    for (control_weight, velocity_weight, fast_limit) in [(3e-5, 0.05, 0.3), (3e-4, 0.0, 0.1)] {
         let wild = LaneRecipe {
-            efforts: vec![effort],
+            control_weights: vec![control_weight],
             velocity_weights: vec![velocity_weight],
             noise_factors: vec![0.2],
             fast_limits: vec![fast_limit],
@@ -138,12 +140,12 @@ fn an_aggressive_feedback_lane_in_a_late_loop_is_handed_over_in_time() {
             ..recipe.clone()
         };
         let with = |lane: &LaneDescription| Description { feedback_lane: Some(lane.clone()), ..description.clone() };
-        let lane = strongest_lane(&wild, &plant, &logs, &one, SEED, &|lane| model(&with(lane))).expect("a lane");
+        let lane = strongest_lane(&wild, &closed_loop, &logs, &one, SEED, &|lane| model(&with(lane))).expect("a lane");
         let mut open = with(&lane.lane);
         open.outputs.iter_mut().for_each(|output| (output.limit, output.slew) = (output.limit + 0.5, output.slew + 0.1));
         let bytes = model(&open).expect("a model");
         for network in [true, false] {
-            let name = format!("effort {effort}, clamp {fast_limit} m, late, network {network}");
+            let name = format!("control weight {control_weight}, clamp {fast_limit} m, late, network {network}");
             let [unguarded, guarded] = compared(&name, &late, &trajectories, &bytes, Lanes { network, feedback: true });
             assert!(unguarded.worst > BAR, "the lane must oscillate without the guard: {unguarded:?}");
             assert!(guarded.worst <= BAR && guarded.by_oscillation >= 1, "{guarded:?}");
@@ -156,15 +158,15 @@ fn an_aggressive_feedback_lane_in_a_late_loop_is_handed_over_in_time() {
 #[test]
 fn a_network_with_wrong_weights_is_handed_over_in_time() {
     for (vehicle, other) in [("crazyflie", "crazyflie-brushless"), ("crazyflie-brushless", "crazyflie")] {
-        let plant = plant(vehicle, "lab");
-        let trajectories = strokes(SEED, 12, 1.0, plant.rate_hz()).expect("strokes");
+        let closed_loop = closed_loop(vehicle, "lab");
+        let trajectories = strokes(SEED, 12, 1.0, closed_loop.rate_hz()).expect("strokes");
         let model = |description: &Description, network: &FloatNetwork| {
             encode(&Description { feedback_lane: None, ..description.clone() }, Some(network), Precision::Float, &[])
                 .expect("a model")
         };
         let (description, network) = parts(other, "lab");
         let name = format!("weights of {other} on {vehicle}");
-        let [_, guarded] = compared(&name, &plant, &trajectories, &model(&description, &network), NETWORK);
+        let [_, guarded] = compared(&name, &closed_loop, &trajectories, &model(&description, &network), NETWORK);
         assert!(guarded.worst <= BAR, "{guarded:?}");
 
         let (description, mut network) = parts(vehicle, "lab");
@@ -172,7 +174,7 @@ fn a_network_with_wrong_weights_is_handed_over_in_time() {
         let parts = last.weights.iter_mut().chain(&mut last.bias).chain(network.skip.iter_mut().flatten());
         parts.chain(&mut network.output_mean).for_each(|value| *value = -*value);
         let name = format!("opposite weights on {vehicle}");
-        let [unguarded, guarded] = compared(&name, &plant, &trajectories, &model(&description, &network), NETWORK);
+        let [unguarded, guarded] = compared(&name, &closed_loop, &trajectories, &model(&description, &network), NETWORK);
         assert!(unguarded.worst > BAR, "the weights must do harm: {unguarded:?}");
         // The error of the first motion is made before it can be measured: of it the guard can only take a part.
         assert!(guarded.worst < unguarded.worst && guarded.tripped == guarded.flights, "{guarded:?}");

@@ -15,16 +15,16 @@ use impromptu_sim::{
 use crate::board::model;
 
 /// The loop of the emulated flights.
-pub(crate) fn plant() -> Loop {
+pub(crate) fn closed_loop() -> Loop {
     Loop::new(Vehicle::named("crazyflie").unwrap(), "stock", Condition::named("lab").unwrap()).unwrap()
 }
 
 #[test]
 fn flights_through_the_firmware_have_every_bit_of_the_software_and_miss_no_deadline() {
-    let plant = plant();
+    let closed_loop = closed_loop();
     let file = model::file(&model::TANH, Precision::Int8);
     let model = Model::from_bytes(&file).unwrap();
-    let trajectories = strokes(1, 30, 1.0, plant.rate_hz()).unwrap();
+    let trajectories = strokes(1, 30, 1.0, closed_loop.rate_hz()).unwrap();
     let (mut emulated, mut board) = pil::start(Some(&file), LinkKind::Lockstep, 3).unwrap();
     assert_eq!(board.introduce().unwrap(), Some(model.checksum()));
     let plans: Vec<FlightPlan<'_>> = trajectories
@@ -33,7 +33,7 @@ fn flights_through_the_firmware_have_every_bit_of_the_software_and_miss_no_deadl
         .map(|(trajectory, seed)| FlightPlan::new(trajectory, seed).with(&model, Lanes::BOTH))
         .chain([FlightPlan::new(&trajectories[0], 7)])
         .collect();
-    let (records, report) = pil::fly(&mut board, &plant, &plans, |_| ()).unwrap();
+    let (records, report) = pil::fly(&mut board, &closed_loop, &plans, |_| ()).unwrap();
     println!("{report:?}");
     assert!(report.bit_identical);
     assert!(records.iter().all(|record| record.rms > 0.01 && record.rms < 0.5), "the flights prove something");
@@ -60,16 +60,16 @@ struct Flown {
 
 /// Flies a stroke through a line that has these faults from the take-off on.
 fn with_faults(faults: Faults) -> Flown {
-    let plant = plant();
-    let trajectory = strokes(1, 1, 1.0, plant.rate_hz()).unwrap().remove(0);
+    let closed_loop = closed_loop();
+    let trajectory = strokes(1, 1, 1.0, closed_loop.rate_hz()).unwrap().remove(0);
     let file = model::file(&model::TANH, Precision::Int8);
     let model = Model::from_bytes(&file).unwrap();
     let (_emulated, line) = pil::connect(&pil::firmware().unwrap(), &[], Some(&file), LinkKind::Lockstep, 3).unwrap();
     let mut board = Board::new(Faulty::new(line, Faults { first: TAKE_OFF, ..faults }, 11), true);
     board.introduce().unwrap();
-    let mut flight = board.prepare(&plant.settings, Some(Lanes::BOTH)).unwrap();
+    let mut flight = board.prepare(&closed_loop.settings, Some(Lanes::BOTH)).unwrap();
     let plan = FlightPlan { record: true, ..FlightPlan::new(&trajectory, 7).with(&model, Lanes::BOTH) };
-    let record = fly_on(&mut flight, &plant.vehicle, &plant.settings, &plant.condition, &plan).unwrap();
+    let record = fly_on(&mut flight, &closed_loop.vehicle, &closed_loop.settings, &closed_loop.condition, &plan).unwrap();
     // After the motors are off the trajectory is refused.
     let refused = flight.check().is_err();
     assert!(!refused || !board.telemetry().armed);
@@ -121,16 +121,16 @@ fn a_silent_peer_costs_the_add_on_first_and_then_the_motors() {
 
 #[test]
 fn the_serial_port_carries_a_flight_bit_for_bit() {
-    let plant = plant();
+    let closed_loop = closed_loop();
     let file = model::file(&model::TANH, Precision::Int8);
     let model = Model::from_bytes(&file).unwrap();
-    let mut trajectory = strokes(1, 1, 1.0, plant.rate_hz()).unwrap().remove(0);
+    let mut trajectory = strokes(1, 1, 1.0, closed_loop.rate_hz()).unwrap().remove(0);
     // The emulated port manages a few hundred ticks a second.
     trajectory.samples.truncate(300);
     trajectory.scored = 0..300;
     let (_emulated, mut board) = pil::start(Some(&file), LinkKind::Uart, 3).unwrap();
     assert_eq!(board.introduce().unwrap(), Some(model.checksum()));
     let plans = [FlightPlan::new(&trajectory, 7), FlightPlan::new(&trajectory, 7).with(&model, Lanes::BOTH)];
-    let (_, report) = pil::fly(&mut board, &plant, &plans, |_| ()).unwrap();
+    let (_, report) = pil::fly(&mut board, &closed_loop, &plans, |_| ()).unwrap();
     assert!(report.bit_identical && report.figures.dropped == 0, "{report:?}");
 }

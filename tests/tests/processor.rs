@@ -18,7 +18,7 @@ use impromptu_sim::{
 };
 use impromptu_tests::mcu::counter;
 
-use crate::{board::model, pil::plant};
+use crate::{board::model, pil::closed_loop};
 
 /// Instructions from the tick's interrupt to the control task, whatever else runs: twice the 14 of an empty task.
 const ENTRY_BOUND: u32 = 40;
@@ -28,7 +28,7 @@ const SHARE: f64 = 0.15;
 const TICK_CYCLES: u64 = 336_000;
 
 fn stroke(seconds: usize) -> Trajectory {
-    let mut trajectory = strokes(1, 1, 1.0, plant().rate_hz()).unwrap().remove(0);
+    let mut trajectory = strokes(1, 1, 1.0, closed_loop().rate_hz()).unwrap().remove(0);
     trajectory.samples.truncate(100 * seconds);
     trajectory.scored = 0..trajectory.samples.len();
     trajectory
@@ -42,7 +42,7 @@ fn fly(lanes: Option<Lanes>, shift: u32) -> PilReport {
     let (_emulated, mut board) = pil::start(Some(&file), LinkKind::Lockstep, shift).unwrap();
     board.introduce().unwrap();
     let plan = FlightPlan { model: lanes.map(|lanes| (&model, lanes)), ..FlightPlan::new(&trajectory, 3) };
-    pil::fly(&mut board, &plant(), &[plan], |_| ()).unwrap().1
+    pil::fly(&mut board, &closed_loop(), &[plan], |_| ()).unwrap().1
 }
 
 /// At 31 million instructions a second an inference takes longer than a control tick, which interrupts it.
@@ -64,7 +64,7 @@ fn a_whole_flight_takes_a_small_share_of_the_processor() {
     let file = model::file_at(2, &model::RELU, Precision::Int8);
     let model = Model::from_bytes(&file).unwrap();
     let trajectory = stroke(10);
-    let plant = plant();
+    let closed_loop = closed_loop();
     let counts = tempfile::NamedTempFile::new().unwrap();
     let plugin = format!("{},out={}", counter::build().unwrap().display(), counts.path().display());
     let further = ["-plugin", &plugin];
@@ -73,8 +73,8 @@ fn a_whole_flight_takes_a_small_share_of_the_processor() {
     let mut board = Board::new(line, true);
     board.introduce().unwrap();
     let plan = FlightPlan::new(&trajectory, 3).with(&model, Lanes::BOTH);
-    let flight = board.prepare(&plant.settings, Some(Lanes::BOTH)).unwrap();
-    fly_on(flight, &plant.vehicle, &plant.settings, &plant.condition, &plan).unwrap();
+    let flight = board.prepare(&closed_loop.settings, Some(Lanes::BOTH)).unwrap();
+    fly_on(flight, &closed_loop.vehicle, &closed_loop.settings, &closed_loop.condition, &plan).unwrap();
     board.end();
     assert_eq!(emulated.ended().unwrap(), Some(0));
     let (entries, _) = counter::read(counts.path()).unwrap();
@@ -93,13 +93,13 @@ fn a_whole_flight_takes_a_small_share_of_the_processor() {
 /// Inferences that are never in time are counted, the network trips, and what is left is the baseline to the bit.
 #[test]
 fn late_inferences_are_counted_and_leave_the_baseline() {
-    let plant = plant();
+    let closed_loop = closed_loop();
     let file = model::file(&model::TANH, Precision::Int8);
     let model = Model::from_bytes(&file).unwrap();
     let trajectory = stroke(12);
     let network = Lanes { network: true, feedback: false };
     let fly = |addon: bool, late_from: u32| {
-        let mut flight = Flight::new(&plant.settings).unwrap();
+        let mut flight = Flight::new(&closed_loop.settings).unwrap();
         if addon {
             flight.attach(&model, network).unwrap();
         }

@@ -22,7 +22,7 @@ use impromptu_tests::emulator::{BOARD, build_firmware};
 
 use crate::{board::model, image};
 
-fn plant() -> Loop {
+fn closed_loop() -> Loop {
     Loop::new(Vehicle::named("crazyflie").unwrap(), "stock", Condition::named("lab").unwrap()).unwrap()
 }
 
@@ -34,18 +34,18 @@ fn reason(result: Result<(), PilError>) -> Reason {
 }
 
 /// One flight, in software and on the board, has the same bits.
-fn flies<L: Line>(board: &mut Board<L>, plant: &Loop, model: &Model<'_>) {
-    let trajectory = strokes(1, 1, 1.0, plant.rate_hz()).unwrap().remove(0);
+fn flies<L: Line>(board: &mut Board<L>, closed_loop: &Loop, model: &Model<'_>) {
+    let trajectory = strokes(1, 1, 1.0, closed_loop.rate_hz()).unwrap().remove(0);
     let plan = FlightPlan { record: true, model: Some((model, Lanes::BOTH)), ..FlightPlan::new(&trajectory, 7) };
-    let software = plant.fly(std::slice::from_ref(&plan)).unwrap().remove(0);
-    let flight = board.prepare(&plant.settings, Some(Lanes::BOTH)).unwrap();
-    let hardware = fly_on(flight, &plant.vehicle, &plant.settings, &plant.condition, &plan).unwrap();
+    let software = closed_loop.fly(std::slice::from_ref(&plan)).unwrap().remove(0);
+    let flight = board.prepare(&closed_loop.settings, Some(Lanes::BOTH)).unwrap();
+    let hardware = fly_on(flight, &closed_loop.vehicle, &closed_loop.settings, &closed_loop.condition, &plan).unwrap();
     assert!(software.recorded == hardware.recorded);
 }
 
 #[test]
 fn an_uploaded_model_flies_after_the_restart_and_never_before() {
-    let plant = plant();
+    let closed_loop = closed_loop();
     let [old, new] = [Precision::Int8, Precision::Float].map(|precision| model::file(&model::TANH, precision));
     let [first, second] = [&old, &new].map(|file| Model::from_bytes(file).unwrap());
     let (emulated, mut board) = pil::start(Some(&old), LinkKind::Lockstep, 3).unwrap();
@@ -53,16 +53,16 @@ fn an_uploaded_model_flies_after_the_restart_and_never_before() {
     board.upload(&new).unwrap();
     // Not armed before the restart, which may come at any time.
     assert_eq!(board.introduce().unwrap(), Some(first.checksum()));
-    let mut flight = board.prepare(&plant.settings, None).unwrap();
+    let mut flight = board.prepare(&closed_loop.settings, None).unwrap();
     flight.step(Tick(0), &State::default());
     assert_eq!(reason(flight.check()), Reason::Busy);
 
     let (emulated, mut board) = pil::restart(emulated).unwrap();
     assert_eq!(board.introduce().unwrap(), Some(second.checksum()));
-    flies(&mut board, &plant, &second);
+    flies(&mut board, &closed_loop, &second);
     // And back again, into the other slot.
     assert_eq!(reason(board.upload(&old)), Reason::Armed);
-    board.prepare(&plant.settings, None).unwrap();
+    board.prepare(&closed_loop.settings, None).unwrap();
     board.upload(&old).unwrap();
     // The board looks at its stack once in a thousand ticks: by now at that of a start, a flight and an upload.
     (0..2_100).for_each(|_| assert_eq!(board.introduce().unwrap(), Some(second.checksum())));
@@ -71,7 +71,7 @@ fn an_uploaded_model_flies_after_the_restart_and_never_before() {
     assert!((bound / 2..=bound).contains(&measured), "{measured} bytes of at most {bound}");
     let (_emulated, mut board) = pil::restart(emulated).unwrap();
     assert_eq!(board.introduce().unwrap(), Some(first.checksum()));
-    flies(&mut board, &plant, &first);
+    flies(&mut board, &closed_loop, &first);
 }
 
 #[test]
@@ -99,8 +99,8 @@ fn what_is_no_model_for_this_vehicle_is_refused_and_the_old_one_flies_on() {
 
     let (_emulated, mut board) = pil::restart(emulated).unwrap();
     assert_eq!(board.introduce().unwrap(), Some(file::checksum(&old)));
-    let plant = plant();
-    let mut flight = board.prepare(&plant.settings, None).unwrap();
+    let closed_loop = closed_loop();
+    let mut flight = board.prepare(&closed_loop.settings, None).unwrap();
     for _ in 0..4 {
         flight.push_setpoint(&Setpoint::default());
     }

@@ -1,44 +1,23 @@
 //! What both boards share: how they start, what their tasks do, where models lie, what motors get.
+//!
+//! The programs are in `src/bin/`, each for one board: they own the peripherals and give their tasks what is here. Nothing here touches a
+//! register, so that the same code is checked on the host.
+//!
+//! | layer | modules | what they hold |
+//! |--:|---|---|
+//! | 1 | `vehicle` | the vehicle, its rates, its link |
+//! | 1 | `slots` | where the models lie in the flash |
+//! | 2 | `motor` | rotor speeds to duty cycles |
+//! | 2 | `start` | the newest model that the vehicle can fly, and the loop before it is sent another |
+//! | 3 | `tasks` | control, receiver, inference, storage: what each does when it runs |
 #![no_std]
 
 pub mod motor;
 pub mod slots;
 mod start;
 mod tasks;
-
-use impromptu_flight::{
-    control::{Airframe, AttitudeGains, PositionGains},
-    flight::{Rates, Settings},
-};
+mod vehicle;
 
 pub use start::{Start, fits, start};
 pub use tasks::{Cost, Tasks, Tick};
-
-/// Control ticks a second.
-pub const CONTROL_HZ: u32 = 500;
-/// Clock of the core, Hz.
-pub const CORE_HZ: u32 = 168_000_000;
-
-/// Bits a second on the link of the real board, ten for a byte.
-pub const LINK_BAUD: u32 = 1_000_000;
-
-/// Bytes a second that a flight takes to the vehicle: an attitude of 39 bytes at every control tick, a position of 39 and a setpoint of 50 at
-/// every reference tick. From the vehicle: motors of 51 at every control tick, some telemetry.
-const LINK_BYTES: u32 = 39 * CONTROL_HZ + (39 + 50) * CONTROL_HZ / 5;
-const _: () = assert!(LINK_BAUD >= 3 * 10 * LINK_BYTES, "what is said again, and an upload, need room too");
-
-/// A Crazyflie 2.x with the gains of `host-sim`'s vehicle `crazyflie`; whoever talks to the board can send others.
-pub const CRAZYFLIE: Settings = Settings {
-    airframe: Airframe {
-        mass: 0.03,
-        inertia: [1.43e-5, 1.43e-5, 2.89e-5],
-        rotors: [[0.03077, 0.03077], [0.03077, -0.03077], [-0.03077, -0.03077], [-0.03077, 0.03077]],
-        directions: [1.0, -1.0, 1.0, -1.0],
-        thrust_coefficient: 2.3e-8,
-        torque_coefficient: 7.8e-10,
-        max_rotor_speed: 2_500.0,
-    },
-    position: PositionGains { kp: [6.5, 6.5, 15.0], kd: [4.0, 4.0, 9.0], ki: [0.0; 3], integral_limit: 0.0 },
-    attitude: AttitudeGains { kp: 544.0, kd: 46.64 },
-    rates: Rates { control_hz: CONTROL_HZ as f32, position_divisor: 5 },
-};
+pub use vehicle::{CONTROL_HZ, CORE_HZ, CRAZYFLIE, LINK_BAUD};

@@ -6,7 +6,7 @@
 //!
 //! A battery that is not full turns the rotors slower: who flies fast compensates the voltage.
 
-use crate::CRAZYFLIE;
+use crate::vehicle::CRAZYFLIE;
 
 /// Revolutions a minute for a step of the duty cycle in 16 bits.
 const SCALE: f32 = 0.2685;
@@ -15,7 +15,7 @@ const OFFSET: f32 = 4_070.3;
 /// Revolutions a minute at the largest rotor speed.
 const FULL: f32 = CRAZYFLIE.airframe.max_rotor_speed * 60.0 / core::f32::consts::TAU;
 
-/// The duty cycle for a fraction of the largest rotor speed; 0 also for what is not a number.
+/// The duty cycle for a fraction of the largest rotor speed; 0 also for NaN.
 pub fn duty(fraction: f32) -> f32 {
     let share = (fraction * FULL - OFFSET) / (SCALE * 65_535.0);
     if share > 1.0 {

@@ -3,12 +3,12 @@
 use impromptu_firmware::{
     model::{Model, Refusal},
     network::{Network, Scratch},
-    storage::{SlotIndex, Sequence, Survey, survey},
+    storage::{Sequence, SlotIndex, Survey, survey},
 };
 use impromptu_flight::{application::Application, flight::Flight};
 use static_cell::ConstStaticCell;
 
-use crate::CRAZYFLIE;
+use crate::vehicle::CRAZYFLIE;
 
 /// A board that is ready.
 pub struct Start {

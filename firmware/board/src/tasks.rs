@@ -1,7 +1,7 @@
 //! What the tasks of a board do; which interrupt runs them is the board's affair.
 //!
 //! *in* bytes, control ticks, jobs, pieces of models; *out* motor commands, and which task of lower priority has something to do; *never* a
-//! wait for a task of lower priority: everything between them goes through mailboxes; *source* ours.
+//! wait for a task of lower priority: everything between them goes through mailboxes.
 
 use core::{
     hint::black_box,
@@ -83,10 +83,10 @@ impl Tasks {
         }
     }
 
-    /// Control: hears bytes of the link; whether the storage has a piece to store.
+    /// Control: takes bytes of the link; whether the storage has a piece to store.
     // Apart from the flight, which needs none of its stack.
     #[inline(never)]
-    pub fn hear(&self, application: &mut Application<'_>, bytes: &[u8]) -> bool {
+    pub fn on_bytes(&self, application: &mut Application<'_>, bytes: &[u8]) -> bool {
         let mut piece = false;
         for byte in bytes {
             if let Some(upload) = application.on_byte(*byte) {
@@ -97,9 +97,9 @@ impl Tasks {
         piece
     }
 
-    /// Control: flies a tick; `heard` is what hearing for it cost.
+    /// Control: flies a tick; `received` is what taking its bytes cost.
     #[inline(never)]
-    pub fn fly(&self, application: &mut Application<'_>, meters: &mut Meters, counter: &impl Cost, heard: u32) -> Tick {
+    pub fn fly(&self, application: &mut Application<'_>, meters: &mut Meters, counter: &impl Cost, received: u32) -> Tick {
         // With the first tick of a flight comes its trajectory.
         let flying = application.autopilot().in_flight();
         let mut job = Job::EMPTY;
@@ -118,7 +118,7 @@ impl Tasks {
             }
             (command, released)
         });
-        let cost = heard.saturating_add(flown);
+        let cost = received.saturating_add(flown);
         if flying {
             meters.control_max = meters.control_max.max(cost);
         }

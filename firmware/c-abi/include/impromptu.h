@@ -334,35 +334,33 @@ const char *impromptu_status_text(int32_t status);
 
 // Checks a model file of `length` bytes and creates the model in `model`, which has `size` bytes (sizeof *model).
 //
-// The bytes stay where they are, in flash for instance: they must live and keep unchanged as long as the model. They should start at a multiple of
-// 16 bytes; elsewhere they are read by slower kernels, with the same results. Needs up to 4 KB of stack on a microcontroller; what is not said to need more, 2 KB.
-impromptu_status impromptu_model_create(struct impromptu_model *model,
-                                        size_t size,
-                                        const uint8_t *bytes,
-                                        size_t length);
+// The bytes stay where they are, in flash for instance: they must live and keep unchanged as long as the model. They should
+// start at a multiple of 16 bytes; elsewhere they are read by slower kernels, with the same results. Needs up to 4 KB of stack
+// on a microcontroller; what is not said to need more, 2 KB.
+impromptu_status impromptu_model_create(struct impromptu_model *model, size_t size, const uint8_t *bytes, size_t length);
 
 // What a model says of itself.
 impromptu_status impromptu_model_describe(const struct impromptu_model *model, struct impromptu_description *description);
 
-// Creates the working memory of an evaluation in `scratch`, which has `size` bytes. One is enough for everything that never runs at the
-// same time.
-impromptu_status impromptu_scratch_create(struct impromptu_scratch *scratch,
-                                          size_t size);
+// Creates the working memory of an evaluation in `scratch`, which has `size` bytes. One is enough for everything that never runs
+// at the same time.
+impromptu_status impromptu_scratch_create(struct impromptu_scratch *scratch, size_t size);
 
-// Evaluates the network: the work of a task of lower priority. It touches nothing but its arguments, so that an adapter or flight stack may go
-// on at the same time.
+// Evaluates the network: the work of a task of lower priority. It touches nothing but its arguments, so that an adapter or
+// flight stack may go on at the same time.
 impromptu_status impromptu_job_run(const struct impromptu_job *job,
                                    const struct impromptu_model *model,
                                    struct impromptu_scratch *scratch,
                                    struct impromptu_inference *inference);
 
-// Bytes of an object as the library was compiled: at most the sizeof of its type in the header. For checks in tests and start-up code.
+// Bytes of an object as the library was compiled: at most the sizeof of its type in the header. For checks in tests and start-up
+// code.
 size_t impromptu_model_size(void);
 
 // Creates an adapter in `adapter`, which has `size` bytes, for a loop whose references run at `rate_hz`. Both lanes are off.
 //
-// `signals` is compared with the model's table, name by name; NULL takes the model's for the application's. The model must live as
-// long as the adapter. The first sample pushed will be that of reference tick `first_tick`. Needs up to 4 KB of stack.
+// `signals` is compared with the model's table, name by name; NULL takes the model's for the application's. The model must live
+// as long as the adapter. The first sample pushed will be that of reference tick `first_tick`. Needs up to 4 KB of stack.
 impromptu_status impromptu_adapter_create(struct impromptu_adapter *adapter,
                                           size_t size,
                                           const struct impromptu_model *model,
@@ -370,20 +368,18 @@ impromptu_status impromptu_adapter_create(struct impromptu_adapter *adapter,
                                           float rate_hz,
                                           int32_t first_tick);
 
-// impromptu_adapter_create for the signals of a quadrotor, as the flight stack has them: 10 desired channels (position, velocity,
-// acceleration, yaw), 13 measured (position, velocity, roll, pitch, yaw, body rates, vertical acceleration without gravity), 6
-// references (position, velocity). m, s, rad; world ENU, body FLU, pitch positive nose down.
+// impromptu_adapter_create for the signals of a quadrotor, as the flight stack has them: 10 desired channels (position,
+// velocity, acceleration, yaw), 13 measured (position, velocity, roll, pitch, yaw, body rates, vertical acceleration without
+// gravity), 6 references (position, velocity). m, s, rad; world ENU, body FLU, pitch positive nose down.
 impromptu_status impromptu_adapter_create_quadrotor(struct impromptu_adapter *adapter,
                                                     size_t size,
                                                     const struct impromptu_model *model,
                                                     float rate_hz,
                                                     int32_t first_tick);
 
-// Appends the desired channels of the next reference tick. Push as far ahead as impromptu_description.future says; what is missing
-// is taken as the trajectory's end.
-impromptu_status impromptu_adapter_push(struct impromptu_adapter *adapter,
-                                        const float *desired,
-                                        size_t count);
+// Appends the desired channels of the next reference tick. Push as far ahead as impromptu_description.future says; what is
+// missing is taken as the trajectory's end.
+impromptu_status impromptu_adapter_push(struct impromptu_adapter *adapter, const float *desired, size_t count);
 
 // Forgets the trajectory, for another one: the next sample pushed will be that of reference tick `first_tick`.
 impromptu_status impromptu_adapter_restart(struct impromptu_adapter *adapter, int32_t first_tick);
@@ -405,8 +401,8 @@ impromptu_status impromptu_adapter_step(struct impromptu_adapter *adapter,
                                         float *reference,
                                         size_t reference_count);
 
-// First part of a reference tick. Sets `due` to 1 and writes `job` if the network is to be evaluated (impromptu_job_run), else sets it to 0
-// and leaves `job` alone. The inference is given to impromptu_adapter_deliver by whoever calls the adapter, before
+// First part of a reference tick. Sets `due` to 1 and writes `job` if the network is to be evaluated (impromptu_job_run), else
+// sets it to 0 and leaves `job` alone. The inference is given to impromptu_adapter_deliver by whoever calls the adapter, before
 // impromptu_adapter_finish or, after impromptu_adapter_defer, before the next impromptu_adapter_begin.
 impromptu_status impromptu_adapter_begin(struct impromptu_adapter *adapter,
                                          int32_t tick,
@@ -450,17 +446,17 @@ impromptu_status impromptu_flight_push(struct impromptu_flight *flight, const st
 // Switches the network lane and the feedback lane on (not 0) or off.
 impromptu_status impromptu_flight_switch(struct impromptu_flight *flight, int network, int feedback);
 
-// One control tick, the network included. Ticks count from 0. A state that is not finite gives IMPROMPTU_STATUS_NOT_FINITE and no
-// command: what the motors then do is the caller's decision. Needs up to 4 KB of stack.
+// One control tick, the network included. Ticks count from 0. A state that is not finite gives IMPROMPTU_STATUS_NOT_FINITE and
+// no command: what the motors then do is the caller's decision. Needs up to 4 KB of stack.
 impromptu_status impromptu_flight_step(struct impromptu_flight *flight,
                                        struct impromptu_scratch *scratch,
                                        uint32_t tick,
                                        const struct impromptu_state *state,
                                        struct impromptu_command *command);
 
-// One control tick without the network: the same commands as impromptu_flight_step, if each inference is delivered before the next
-// reference tick. Sets `due` to 1 and writes `job` if the network is to be evaluated (impromptu_job_run), else sets it to 0.
-// Needs up to 4 KB of stack.
+// One control tick without the network: the same commands as impromptu_flight_step, if each inference is delivered before the
+// next reference tick. Sets `due` to 1 and writes `job` if the network is to be evaluated (impromptu_job_run), else sets it to
+// 0. Needs up to 4 KB of stack.
 impromptu_status impromptu_flight_control(struct impromptu_flight *flight,
                                           uint32_t tick,
                                           const struct impromptu_state *state,

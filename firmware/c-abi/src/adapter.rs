@@ -1,9 +1,9 @@
 //! The add-on alone, with as many channels as its signal table has at run time.
 //!
-//! *in* desired and measured channels, counted; *out* reference channels; *never* other bits than those of an add-on whose arrays have just these
-//! channels; *source* [`impromptu_firmware::add_on`].
+//! *in* desired and measured channels, counted; *out* reference channels; *never* other bits than those of an add-on whose arrays
+//! have just these channels; *source* [`impromptu_firmware::add_on`].
 
-use impromptu_firmware::add_on::{AddOn, NotFinite};
+use impromptu_firmware::{AddOn, add_on::NotFinite};
 
 use crate::{
     status::Status,

@@ -1,7 +1,7 @@
 //! The caller's memory for the library's objects.
 //!
-//! *in* nothing; *out* types whose size a C compiler knows; *never* a size that is too small: then this crate does not compile; *source* the
-//! sizes of the Rust types, which depend on the width of a pointer and a little on the compiler, rounded up.
+//! *in* nothing; *out* types whose size a C compiler knows; *never* a size that is too small: then this crate does not compile;
+//! *source* the sizes of the Rust types, which depend on the width of a pointer and a little on the compiler, rounded up.
 
 use impromptu_firmware::{model::Model, network::Scratch};
 

@@ -1,7 +1,7 @@
 //! What came of a call.
 //!
-//! *in* refusals of a model and faults of the caller; *out* a number and what to do about it; *never* another number for the same thing in
-//! a later version: new ones are added behind the last; *source* [`Refusal`].
+//! *in* refusals of a model and faults of the caller; *out* a number and what to do about it; *never* another number for the same
+//! thing in a later version: new ones are added behind the last; *source* [`Refusal`].
 
 use core::ffi::CStr;
 

@@ -1,7 +1,7 @@
 //! Plain numbers as C sees them.
 //!
-//! *in/out* structures of f32, u32 and i32 in a layout that C knows; *never* padding between numbers, a pointer into the library, or a
-//! value that Rust could not hold; *source* [`impromptu_flight::types`], [`impromptu_flight::flight::Settings`].
+//! *in/out* structures of f32, u32 and i32 in a layout that C knows; *never* padding between numbers, a pointer into the library,
+//! or a value that Rust could not hold; *source* [`impromptu_flight::types`], [`impromptu_flight::flight::Settings`].
 
 use core::ffi::c_char;
 

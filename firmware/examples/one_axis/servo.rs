@@ -1,7 +1,8 @@
 //! A servo with friction: a DC motor behind a gear, and the position loop that drives it.
 //!
-//! *in* the reference of the loop at every tick, rad; *out* the angle that the encoder reads, rad; *never* a voltage above the supply's; *source* a
-//! motor of first order in its speed, with Coulomb and static friction (Armstrong-Hélouvry 1991, Stribeck's curve) in volts.
+//! *in* the reference of the loop at every tick, rad; *out* the angle that the encoder reads, rad; *never* a voltage above the
+//! supply's; *source* a motor of first order in its speed, with Coulomb and static friction (Armstrong-Hélouvry 1991, Stribeck's
+//! curve) in volts.
 
 use impromptu_firmware::{
     math::{abs, clamp, sin_cos},
@@ -25,8 +26,8 @@ const SUPPLY: f32 = 12.0;
 /// The motor: speed for a volt, rad/s, and the time in which it gets there, s.
 const SPEED: f32 = 2.0;
 const TIME: f32 = 0.08;
-/// Friction of the moving shaft and of the resting one, V, and the speeds at which it has reversed and at which half of the difference is
-/// gone, rad/s.
+/// Friction of the moving shaft and of the resting one, V, and the speeds at which it has reversed and at which half of the
+/// difference is gone, rad/s.
 const MOVING: f32 = 0.6;
 const RESTING: f32 = 0.9;
 const REVERSED: f32 = 0.02;

@@ -6,10 +6,10 @@
 use core::num::NonZeroU32;
 
 use impromptu_firmware::{
+    AddOn,
     adapter::{Adapter, Inference, Job, Lanes},
     model::{MAX_AXES, Model, Refusal},
     network::Scratch,
-    preview::{EndRule, Preview},
 };
 use nalgebra::{Matrix3, Vector3};
 
@@ -26,6 +26,9 @@ pub const PREVIEW: usize = 192;
 
 /// The adapter of the flight stack.
 pub type QuadrotorAdapter<'m> = Adapter<'m, DESIRED, MEASURED, REFERENCE>;
+
+/// The add-on of the flight stack.
+pub type QuadrotorAddOn<'m> = AddOn<'m, DESIRED, MEASURED, REFERENCE, PREVIEW>;
 
 /// The loops of a vehicle.
 #[derive(Debug)]
@@ -50,7 +53,7 @@ impl Loops {
     }
 }
 
-/// What is configured and attached. The adapter has a model exactly if this is [`Stage::Adapted`], and a model that fits these
+/// What is configured and attached. The add-on has a model exactly if this is [`Stage::Adapted`], and a model that fits these
 /// loops.
 #[derive(Debug)]
 enum Stage {
@@ -82,11 +85,10 @@ impl Stage {
 #[derive(Debug)]
 pub struct Flight<'m> {
     stage: Stage,
-    preview: Preview<DESIRED, PREVIEW>,
-    adapter: QuadrotorAdapter<'m>,
+    add_on: QuadrotorAddOn<'m>,
     wanted: ThrustVector,
     reference: Reference,
-    excitation: Vector3<f32>,
+    dither: Vector3<f32>,
 }
 
 impl<'m> Flight<'m> {
@@ -95,14 +97,13 @@ impl<'m> Flight<'m> {
     pub const fn empty() -> Self {
         Self {
             stage: Stage::Empty,
-            preview: Preview::new([EndRule::Hold; DESIRED], 0),
-            adapter: QuadrotorAdapter::empty(),
+            add_on: QuadrotorAddOn::empty(),
             wanted: ThrustVector {
                 force: Vector3::new(0.0, 0.0, 0.0),
                 attitude: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
             },
             reference: Reference::ORIGIN,
-            excitation: Vector3::new(0.0, 0.0, 0.0),
+            dither: Vector3::new(0.0, 0.0, 0.0),
         }
     }
 
@@ -116,12 +117,12 @@ impl<'m> Flight<'m> {
     /// it was when it was attached but with its lanes off, if its model is for these settings; else it is detached.
     pub fn configure(&mut self, settings: &Settings) -> bool {
         let Some(loops) = Loops::new(settings) else { return false };
-        if self.adapter.model().is_some_and(|model| Self::accepts(model, &settings.rates).is_ok()) {
+        if self.add_on.model().is_some_and(|model| Self::accepts(model, &settings.rates).is_ok()) {
             self.stage = Stage::Adapted(loops);
-            self.adapter.restart();
+            self.add_on.restart(0);
         } else {
             self.stage = Stage::Baseline(loops);
-            self.adapter.unload();
+            let _ = self.add_on.bypass(quadrotor::signals());
         }
         self.reset();
         true
@@ -133,21 +134,21 @@ impl<'m> Flight<'m> {
         if let Some(loops) = self.stage.loops_mut() {
             loops.position.reset();
         }
-        self.preview.restart(quadrotor::END_RULES, 0);
-        self.adapter.reset();
-        (self.wanted, self.reference, self.excitation) = (ThrustVector::NONE, Reference::ORIGIN, Vector3::zeros());
+        self.add_on.reset(0);
+        (self.wanted, self.reference, self.dither) = (ThrustVector::NONE, Reference::ORIGIN, Vector3::zeros());
     }
 
-    /// Puts an add-on before the configured loops, with the lanes given, in the place of the one that was there.
+    /// Puts an add-on before the configured loops, with the lanes given, in the place of the one that was there. The trajectory stays.
     ///
     /// # Errors
     /// If the model is for other signals, another rate, or a longer preview; what was attached then stays. A flight stack without
     /// settings has a rate of 0.
     pub fn attach(&mut self, model: &'m Model<'m>, lanes: Lanes) -> Result<(), Refusal> {
         Self::accepts(model, &self.stage.loops().map_or(Rates::NONE, |loops| loops.rates))?;
-        self.adapter.load(model, &quadrotor::signals());
-        self.adapter.defer();
-        self.adapter.switch(lanes);
+        let (adapter, _) = self.add_on.parts();
+        adapter.load(model, &quadrotor::signals());
+        adapter.defer();
+        adapter.switch(lanes);
         self.stage = match core::mem::replace(&mut self.stage, Stage::Empty) {
             Stage::Empty => Stage::Empty,
             Stage::Baseline(loops) | Stage::Adapted(loops) => Stage::Adapted(loops),
@@ -155,9 +156,11 @@ impl<'m> Flight<'m> {
         Ok(())
     }
 
-    /// Takes the add-on away: the loops fly alone.
+    /// Takes the add-on away: the loops fly alone. The trajectory stays.
     pub fn detach(&mut self) {
-        self.adapter.unload();
+        let (adapter, _) = self.add_on.parts();
+        // The table's references all have the names of desired channels.
+        let _ = adapter.bypass(&quadrotor::signals());
         self.stage = match core::mem::replace(&mut self.stage, Stage::Empty) {
             Stage::Empty => Stage::Empty,
             Stage::Baseline(loops) | Stage::Adapted(loops) => Stage::Baseline(loops),
@@ -170,25 +173,25 @@ impl<'m> Flight<'m> {
     /// As [`Flight::attach`].
     #[inline(never)]
     pub fn accepts(model: &Model<'_>, rates: &Rates) -> Result<(), Refusal> {
-        QuadrotorAdapter::check(model, &quadrotor::signals(), rates.reference_hz(), PREVIEW)
+        QuadrotorAddOn::check(model, quadrotor::signals(), rates.reference_hz())
     }
 
     /// The add-on, if there is one.
     pub fn adapter(&mut self) -> Option<&mut QuadrotorAdapter<'m>> {
         match self.stage {
-            Stage::Adapted(_) => Some(&mut self.adapter),
+            Stage::Adapted(_) => Some(self.add_on.parts().0),
             Stage::Empty | Stage::Baseline(_) => None,
         }
     }
 
     /// Appends the desired state of the next reference tick.
     pub fn push_setpoint(&mut self, setpoint: &Setpoint) {
-        self.preview.push(quadrotor::desired(setpoint));
+        self.add_on.parts().1.push(quadrotor::desired(setpoint));
     }
 
     /// Reference tick of the next [`Flight::push_setpoint`].
     pub fn next_setpoint(&self) -> i32 {
-        self.preview.next_tick()
+        self.add_on.next_tick()
     }
 
     /// The reference that the loop tracks now.
@@ -198,7 +201,7 @@ impl<'m> Flight<'m> {
 
     /// Forgets the desired trajectory: the next setpoint is that of this reference tick.
     pub fn clear_setpoints(&mut self, tick: i32) {
-        self.preview.clear(tick);
+        self.add_on.clear(tick);
     }
 
     /// Reference tick of a control tick.
@@ -209,21 +212,21 @@ impl<'m> Flight<'m> {
 
     /// Where the vehicle is desired to be at a control tick, m, world ENU; of the position loop's last tick.
     pub fn desired_position(&self, tick: Tick) -> Vector3<f32> {
-        let [x, y, z, ..] = self.preview.sample(self.reference_tick(tick));
+        let [x, y, z, ..] = self.add_on.desired(self.reference_tick(tick));
         Vector3::new(x, y, z)
     }
 
     /// Adds an offset, m, world ENU, to the position reference from the next reference tick on: the independent dither without
     /// which the closed loop cannot be identified. Zero leaves every bit as it is.
-    pub fn excite(&mut self, offset: Vector3<f32>) {
-        self.excitation = offset;
+    pub fn set_dither(&mut self, offset: Vector3<f32>) {
+        self.dither = offset;
     }
 
     /// One control tick, the network included.
     pub fn step<const S: usize>(&mut self, tick: Tick, state: &State, scratch: &mut Scratch<S>) -> MotorCommand {
         let (command, job) = self.control(tick, state);
         if let Some(job) = job
-            && let Some(network) = self.adapter.model().and_then(Model::network)
+            && let Some(network) = self.add_on.model().and_then(Model::network)
         {
             self.deliver(job.run(network, scratch));
         }
@@ -258,19 +261,23 @@ impl<'m> Flight<'m> {
         job: &mut Job,
         path: impl FnOnce(&mut [f32; MAX_AXES]),
     ) -> (Option<ThrustVector>, bool) {
-        let (loops, adapter) = match &mut self.stage {
+        let (loops, corrected) = match &mut self.stage {
             Stage::Empty => return (None, false),
-            Stage::Baseline(loops) => (loops, None),
-            Stage::Adapted(loops) => (loops, Some(&mut self.adapter)),
+            Stage::Baseline(loops) => (loops, false),
+            Stage::Adapted(loops) => (loops, true),
         };
         if !tick.0.is_multiple_of(loops.position_divisor.get()) {
             return (None, false);
         }
         let reference_tick = (tick.0 / loops.position_divisor) as i32;
-        let (reference, released) = adapted(&self.preview, adapter, reference_tick, state, job, path);
+        let (reference, released) = if corrected {
+            adapted(&mut self.add_on, reference_tick, state, job, path)
+        } else {
+            (desired(&self.add_on, reference_tick), false)
+        };
         self.reference = reference;
-        if self.excitation != Vector3::zeros() {
-            self.reference.position += self.excitation;
+        if self.dither != Vector3::zeros() {
+            self.reference.position += self.dither;
         }
         (Some(loops.position.step(&self.reference, state)), released)
     }
@@ -284,30 +291,28 @@ impl<'m> Flight<'m> {
 
     /// Takes what came of a job of [`Flight::control`].
     pub fn deliver(&mut self, inference: Inference) {
-        self.adapter.deliver(inference);
+        self.add_on.deliver(inference);
     }
 }
 
-/// The reference at a reference tick, and whether the network has a job.
+/// The corrected reference at a reference tick, and whether the network has a job.
 fn adapted(
-    preview: &Preview<DESIRED, PREVIEW>,
-    adapter: Option<&mut QuadrotorAdapter<'_>>,
+    add_on: &mut QuadrotorAddOn<'_>,
     tick: i32,
     state: &State,
     job: &mut Job,
     path: impl FnOnce(&mut [f32; MAX_AXES]),
 ) -> (Reference, bool) {
-    let desired = preview.sample(tick);
-    let yaw = desired[9];
-    match adapter {
-        Some(adapter) => {
-            let measured = quadrotor::measured(state);
-            let released = adapter.begin_into(tick, preview, &measured, job);
-            (quadrotor::reference(&adapter.finish_through(tick, preview, &measured, path), yaw), released)
-        }
-        None => {
-            let [px, py, pz, vx, vy, vz, ..] = desired;
-            (quadrotor::reference(&[px, py, pz, vx, vy, vz], yaw), false)
-        }
-    }
+    let measured = quadrotor::measured(state);
+    let (adapter, preview) = add_on.parts();
+    let released = adapter.begin_into(tick, preview, &measured, job);
+    let reference = adapter.finish_through(tick, preview, &measured, path);
+    let [.., yaw] = preview.sample(tick);
+    (quadrotor::reference(&reference, yaw), released)
+}
+
+/// The reference without an add-on at a reference tick. The adapter would give the same bits, but for the state's angles first.
+fn desired(add_on: &QuadrotorAddOn<'_>, tick: i32) -> Reference {
+    let [px, py, pz, vx, vy, vz, .., yaw] = add_on.desired(tick);
+    quadrotor::reference(&[px, py, pz, vx, vy, vz], yaw)
 }

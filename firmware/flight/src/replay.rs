@@ -16,7 +16,7 @@
 //!
 //! | record | content |
 //! |--:|---|
-//! | 0..4 | kind, u32: 1 tick, 2 setpoint, 3 lanes, 4 excitation, 5 end |
+//! | 0..4 | kind, u32: 1 tick, 2 setpoint, 3 lanes, 4 dither, 5 end |
 //! | 4.. | 14, 10 or 3 f32 in the order of the fields; lanes, u32: bit 0 network, bit 1 feedback; end: ticks, u32. Then zeros |
 //!
 //! The **answers** are [`ANSWER`] bytes for each tick: four motor fractions, reference position and velocity, f32.

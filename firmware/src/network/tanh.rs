@@ -119,7 +119,7 @@ const fn cubics() -> [Cubic; SATURATED as usize * CUBICS + 1] {
 /// 1.5 × 2²³: in the f32 above it the last bit is worth 1.
 const ROUNDING: f32 = 12_582_912.0;
 
-/// tanh of an f32 to [`TANH_ERROR`]. What is not a number gives ±1.
+/// tanh of an f32 to [`TANH_ERROR`]. NaN gives ±1.
 #[inline(always)]
 pub fn tanh(x: f32) -> f32 {
     let bits = x.to_bits();

@@ -42,7 +42,7 @@ impl AddOn {
     /// Learns, row by row, which reference was in force when the measured output went along the window. `None` if the log is too short.
     pub fn fit<'a>(segments: impl IntoIterator<Item = &'a Segment>, window: Window, features: Features) -> Option<Self> {
         let columns = window.past + window.preview + 2;
-        let mut regression = Regression::new(columns);
+        let mut regression = Regression::new(columns, 1);
         let mut row = vec![0.0; columns];
         let mut rows = 0;
         for Segment { reference, measured } in segments {
@@ -52,7 +52,7 @@ impl AddOn {
                     *cell = value - origin;
                 }
                 row[columns - 1] = 1.0;
-                regression.push(&row, reference[tick] - origin);
+                regression.push(&row, &[reference[tick] - origin]);
                 rows += 1;
             }
         }

@@ -31,7 +31,7 @@ impl Arx {
         let longest = ORDERS[ORDERS.len() - 1];
         let fits = ORDERS.iter().filter(|order| record.len() > 8 * *order + 40).filter_map(|&order| {
             // The same rows for every order: their criteria are compared.
-            let mut regression = Regression::new(2 * order + 2);
+            let mut regression = Regression::new(2 * order + 2, 1);
             let mut row = vec![0.0; 2 * order + 2];
             for Segment { reference, measured } in &record.segments {
                 for tick in longest..measured.len() {
@@ -41,7 +41,7 @@ impl Arx {
                     }
                     row[2 * order] = reference[tick - order];
                     row[2 * order + 1] = 1.0;
-                    regression.push(&row, measured[tick]);
+                    regression.push(&row, &[measured[tick]]);
                 }
             }
             let solution = regression.solve(PENALTY)?;

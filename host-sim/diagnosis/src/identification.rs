@@ -224,7 +224,7 @@ impl Whitened {
     /// One step: signals filtered by 1/F of the step before, then linear least squares.
     fn steiglitz_mcbride(&self, form: &TransferFunction, denominator: &[f64]) -> Option<Solution> {
         let (terms, order) = (form.numerator.len(), denominator.len() - 1);
-        let mut regression = Regression::new(terms + order + 1);
+        let mut regression = Regression::new(terms + order + 1, 1);
         let mut row = vec![0.0; terms + order + 1];
         for segment in &self.segments {
             let input = filter(&[1.0], denominator, &delayed(&segment.reference, form.dead_time));
@@ -237,7 +237,7 @@ impl Whitened {
                     *cell = -output[tick - 1 - lag];
                 }
                 row[terms + order] = self.level;
-                regression.push(&row, output[tick]);
+                regression.push(&row, &[output[tick]]);
             }
         }
         regression.solve(1e-13)
@@ -285,8 +285,8 @@ impl Whitened {
 
     /// The output error linearised in the coefficients.
     fn linearised(&self, model: &TransferFunction) -> Regression {
-        let mut regression = Regression::new(coefficients(model).len());
-        self.gradients(model, |_, row, error| regression.push(row, error));
+        let mut regression = Regression::new(coefficients(model).len(), 1);
+        self.gradients(model, |_, row, error| regression.push(row, &[error]));
         regression
     }
 

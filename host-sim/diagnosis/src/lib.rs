@@ -9,22 +9,24 @@
 //! The channel is u (reference, in the baseline the desired output) to y (measured). Units are the log's; times are seconds,
 //! frequencies hertz, offsets ticks of the sub-rate. Everything random comes from one seed.
 //!
-//! At the bottom are polynomials, records and the one regression; a model of the loop is identified from them, its properties are read off,
+//! At the bottom are polynomials, records and the one regression, which whoever trains something uses as well; a model of the loop is identified from them, its properties are read off,
 //! a prediction is made, and the gates judge. The report puts it all into words.
 //!
 //! | layer | modules | what they hold |
 //! |---|---|---|
-//! | 1 | `polynomial`, `record`, `least_squares` | roots and filters; signals in step; the regression with its covariance |
-//! | 2 | `transfer_function`, `arx`, `excitation`, `add_on` | a rational function of z; lagged regressors; what the log can tell at all; the add-on that is assumed |
-//! | 3 | `identification` | order, dead time, model and covariance |
-//! | 4 | `properties` | gain, zeros, relative degree, lag, each with its interval |
-//! | 5 | `prediction` | by how much the error will shrink |
-//! | 6 | `verdict` | gates and what they come to |
-//! | 7 | `diagnosis` | all of it, at the sub-rate that suits the loop best |
-//! | 8 | `report` | the diagnosis in words |
+//! | 1 | `polynomial`, `record`, `cholesky` | roots and filters; signals in step; positive definite systems |
+//! | 2 | `transfer_function`, `least_squares` | a rational function of z; the regression with its covariance |
+//! | 3 | `arx`, `excitation`, `add_on` | lagged regressors; what the log can tell at all; the add-on that is assumed |
+//! | 4 | `identification` | order, dead time, model and covariance |
+//! | 5 | `properties` | gain, zeros, relative degree, lag, each with its interval |
+//! | 6 | `prediction` | by how much the error will shrink |
+//! | 7 | `verdict` | gates and what they come to |
+//! | 8 | `diagnosis` | all of it, at the sub-rate that suits the loop best |
+//! | 9 | `report` | the diagnosis in words |
 
 pub mod add_on;
 pub mod arx;
+pub mod cholesky;
 pub mod diagnosis;
 pub mod excitation;
 pub mod identification;

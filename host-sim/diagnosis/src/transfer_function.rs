@@ -1,4 +1,4 @@
-//! Transfer functions of a channel in discrete time.
+//! Transfer functions in discrete time: of a channel that was identified, or of a system that is known.
 
 use nalgebra::Complex;
 use serde::Serialize;
@@ -8,9 +8,9 @@ use crate::polynomial::{at_angle, at_one, delayed, filter, roots};
 /// y(t) = q⁻ᵈ B(q⁻¹)/F(q⁻¹) u(t) + offset.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TransferFunction {
-    /// Dead time d in ticks: the strict relative degree if `numerator[0]` is not zero.
+    /// Dead time d in ticks: the relative degree in z if `numerator[0]` is not zero.
     pub dead_time: usize,
-    /// B, in rising powers of q⁻¹.
+    /// B, in rising powers of q⁻¹ (falling ones of z).
     pub numerator: Vec<f64>,
     /// F, in rising powers of q⁻¹, first 1, stable.
     pub denominator: Vec<f64>,
@@ -24,6 +24,11 @@ impl TransferFunction {
         let mut output = filter(&self.numerator, &self.denominator, &delayed(input, self.dead_time));
         output.iter_mut().for_each(|value| *value += self.offset);
         output
+    }
+
+    /// Order of the denominator.
+    pub fn order(&self) -> usize {
+        self.denominator.len() - 1
     }
 
     /// Steady-state gain.

@@ -104,11 +104,11 @@ pub fn run(settings: &DemoSettings, observer: &dyn Observer) -> anyhow::Result<R
     let outcomes: Vec<Outcome> = cases
         .par_iter()
         .enumerate()
-        .map(|(index, (plant, seed))| {
-            let name = format!("{} {} {} seed {seed}", plant.vehicle.name, plant.gains, plant.condition.name);
+        .map(|(index, (closed_loop, seed))| {
+            let name = format!("{} {} {} seed {seed}", closed_loop.vehicle.name, closed_loop.gains, closed_loop.condition.name);
             observer.stage(&format!("{name}: collecting, training, designing the feedback lane"));
             let begin = Instant::now();
-            let built = build(&settings.recipe, plant, *seed, &mut |_| advance(1)).with_context(|| name.clone())?;
+            let built = build(&settings.recipe, closed_loop, *seed, &mut |_| advance(1)).with_context(|| name.clone())?;
             let trained = begin.elapsed().as_secs_f64();
             if !built.learned.broken.is_empty() {
                 observer.stage(&format!("{name}: {} training flights broke down, left out", built.learned.broken.len()));
@@ -117,18 +117,18 @@ pub fn run(settings: &DemoSettings, observer: &dyn Observer) -> anyhow::Result<R
                 Ok(choice) => format!("{name}: feedback lane {}", choice.design),
                 Err(reason) => format!("{name}: written without feedback lane: {reason}"),
             });
-            let flights = test(settings, plant, &built, *seed, &|| advance(3)).with_context(|| name.clone())?;
+            let flights = test(settings, closed_loop, &built, *seed, &|| advance(3)).with_context(|| name.clone())?;
             let test_seed = derived(*seed, Purpose::Test);
-            let traced = if index == 0 || plant.condition.name == "lab" && *seed == settings.seed { TRACED } else { 0 };
+            let traced = if index == 0 || closed_loop.condition.name == "lab" && *seed == settings.seed { TRACED } else { 0 };
             let speed = settings.speeds.first().copied().unwrap_or(1.0);
-            let trajectories = strokes(test_seed, traced, speed, plant.rate_hz())?;
+            let trajectories = strokes(test_seed, traced, speed, closed_loop.rate_hz())?;
             if let Some(out) = &settings.out {
-                write_models(out, plant, &built, *seed)?;
+                write_models(out, closed_loop, &built, *seed)?;
             }
             Ok(Outcome {
                 flights,
-                card: model_card(&built, plant)?,
-                traces: traces(&built, plant, &trajectories, speed, test_seed)?,
+                card: model_card(&built, closed_loop)?,
+                traces: traces(&built, closed_loop, &trajectories, speed, test_seed)?,
                 seconds: [trained, begin.elapsed().as_secs_f64() - trained],
             })
         })
@@ -195,17 +195,23 @@ fn cases(settings: &DemoSettings) -> anyhow::Result<Vec<(Loop, u64)>> {
 }
 
 /// Test flights at every speed, and at the first one with more delay.
-fn test(settings: &DemoSettings, plant: &Loop, built: &Built, seed: u64, advance: &dyn Fn()) -> anyhow::Result<Vec<PerFlight>> {
+fn test(
+    settings: &DemoSettings,
+    closed_loop: &Loop,
+    built: &Built,
+    seed: u64,
+    advance: &dyn Fn(),
+) -> anyhow::Result<Vec<PerFlight>> {
     let test_seed = derived(seed, Purpose::Test);
     let mut flights = Vec::new();
     for &speed in &settings.speeds {
-        let trajectories = strokes(test_seed, settings.strokes, speed, plant.rate_hz())?;
-        flights.extend(evaluate(built, plant, &trajectories, speed, test_seed, seed)?);
+        let trajectories = strokes(test_seed, settings.strokes, speed, closed_loop.rate_hz())?;
+        flights.extend(evaluate(built, closed_loop, &trajectories, speed, test_seed, seed)?);
         advance();
     }
     if let (Some(&speed), true) = (settings.speeds.first(), settings.extra_delay_ms > 0.0) {
-        let late = plant.delayed(settings.extra_delay_ms / 1e3);
-        let trajectories = strokes(test_seed, settings.strokes, speed, plant.rate_hz())?;
+        let late = closed_loop.delayed(settings.extra_delay_ms / 1e3);
+        let trajectories = strokes(test_seed, settings.strokes, speed, closed_loop.rate_hz())?;
         flights.extend(evaluate(built, &late, &trajectories, speed, test_seed, seed)?);
     }
     advance();
@@ -219,8 +225,8 @@ fn folder(out: &Path, name: &str) -> anyhow::Result<PathBuf> {
 }
 
 /// The flashed model of a loop, with the float network, its description and the calibration rows beside it.
-fn write_models(out: &Path, plant: &Loop, built: &Built, seed: u64) -> anyhow::Result<()> {
-    let name = format!("{}-{}-{}-seed{seed}", plant.vehicle.name, plant.gains, plant.condition.name);
+fn write_models(out: &Path, closed_loop: &Loop, built: &Built, seed: u64) -> anyhow::Result<()> {
+    let name = format!("{}-{}-{}-seed{seed}", closed_loop.vehicle.name, closed_loop.gains, closed_loop.condition.name);
     write_model_files(&folder(out, "models")?, &name, &built.learned, &built.models.description, &built.models.int8)?;
     Ok(())
 }

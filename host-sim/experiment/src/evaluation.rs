@@ -49,14 +49,14 @@ fn flown_by(built: &Built, method: Method) -> Option<(&[u8], Lanes)> {
 /// If a model is refused or a flight cannot be flown.
 pub fn evaluate(
     built: &Built,
-    plant: &Loop,
+    closed_loop: &Loop,
     trajectories: &[Trajectory],
     speed: f64,
     flight_seed: u64,
     seed: u64,
 ) -> Result<Vec<PerFlight>, EvaluationError> {
-    let baseline = plant.errors(trajectories, None, 1.0, flight_seed)?;
-    let unguarded = plant.unguarded();
+    let baseline = closed_loop.errors(trajectories, None, 1.0, flight_seed)?;
+    let unguarded = closed_loop.unguarded();
     let mut flights = Vec::new();
     for method in Method::ALL {
         let errors = match flown_by(built, method) {
@@ -65,18 +65,18 @@ pub fn evaluate(
                 let model = Model::from_bytes(bytes).map_err(ExportError::Refused)?;
                 // The guard hands over what it would cost the comparisons: they fly without.
                 let watched = matches!(method, Method::NetF32 | Method::NetInt8 | Method::FullF32 | Method::FullInt8);
-                let plant = if watched { plant } else { &unguarded };
-                plant.errors(trajectories, Some((&model, lanes)), 1.0, flight_seed)?
+                let closed_loop = if watched { closed_loop } else { &unguarded };
+                closed_loop.errors(trajectories, Some((&model, lanes)), 1.0, flight_seed)?
             }
         };
-        flights.extend(per_flight(plant, trajectories, speed, method, &errors, &baseline, seed));
+        flights.extend(per_flight(closed_loop, trajectories, speed, method, &errors, &baseline, seed));
     }
     Ok(flights)
 }
 
 /// Flights as they are reported, of their RMS errors and the baseline's over the same trajectories, m.
 pub fn per_flight(
-    plant: &Loop,
+    closed_loop: &Loop,
     trajectories: &[Trajectory],
     speed: f64,
     method: Method,
@@ -86,9 +86,9 @@ pub fn per_flight(
 ) -> Vec<PerFlight> {
     let flights = trajectories.iter().zip(errors).zip(baseline);
     let report = |((trajectory, error), baseline): ((&Trajectory, &f64), &f64)| PerFlight {
-        vehicle: plant.vehicle.name.clone(),
-        gains: plant.gains.clone(),
-        condition: plant.condition.name.clone(),
+        vehicle: closed_loop.vehicle.name.clone(),
+        gains: closed_loop.gains.clone(),
+        condition: closed_loop.condition.name.clone(),
         speed,
         method,
         trajectory: trajectory.name.clone(),
@@ -105,7 +105,7 @@ pub fn per_flight(
 /// As [`evaluate`].
 pub fn traces(
     built: &Built,
-    plant: &Loop,
+    closed_loop: &Loop,
     trajectories: &[Trajectory],
     speed: f64,
     flight_seed: u64,
@@ -122,13 +122,13 @@ pub fn traces(
                 ..FlightPlan::new(trajectory, seed)
             })
             .collect();
-        for (record, trajectory) in plant.fly(&plans)?.into_iter().zip(trajectories) {
+        for (record, trajectory) in closed_loop.fly(&plans)?.into_iter().zip(trajectories) {
             let Some(log) = record.log else { continue };
             let trace = FlightTrace {
                 trajectory: trajectory.name.clone(),
-                vehicle: plant.vehicle.name.clone(),
-                gains: plant.gains.clone(),
-                condition: plant.condition.name.clone(),
+                vehicle: closed_loop.vehicle.name.clone(),
+                gains: closed_loop.gains.clone(),
+                condition: closed_loop.condition.name.clone(),
                 speed,
                 method,
                 rate_hz: log.rate_hz,
@@ -147,7 +147,7 @@ pub fn traces(
 ///
 /// # Errors
 /// If the file is refused.
-pub fn model_card(built: &Built, plant: &Loop) -> Result<ModelCard, ExportError> {
+pub fn model_card(built: &Built, closed_loop: &Loop) -> Result<ModelCard, ExportError> {
     let bytes = &built.models.int8;
     let model = Model::from_bytes(bytes).map_err(ExportError::Refused)?;
     let card = model.card();
@@ -160,9 +160,9 @@ pub fn model_card(built: &Built, plant: &Loop) -> Result<ModelCard, ExportError>
     let lane_parameters = model.feedback().map_or(0, |lane| lane.multiply_adds());
     Ok(ModelCard {
         name: card.name.into(),
-        vehicle: plant.vehicle.name.clone(),
-        gains: plant.gains.clone(),
-        condition: plant.condition.name.clone(),
+        vehicle: closed_loop.vehicle.name.clone(),
+        gains: closed_loop.gains.clone(),
+        condition: closed_loop.condition.name.clone(),
         bytes: bytes.len() as u64,
         crc32: model.checksum(),
         parameters: (dense + skip) as u64 + u64::from(lane_parameters),

@@ -198,15 +198,15 @@ impl<L: Line> Board<L> {
         // A zero first: what was left on the line shall not cost a frame.
         let outgoing = std::mem::replace(&mut self.outgoing, vec![0]);
         let answer = self.line.exchange(&outgoing);
-        self.hear(answer);
+        self.on_bytes(answer);
         let start = Instant::now();
         while !self.lockstep && !done(self) && self.failure.is_none() && start.elapsed() < PATIENCE {
             let answer = self.line.wait(PATIENCE);
-            self.hear(answer);
+            self.on_bytes(answer);
         }
     }
 
-    fn hear(&mut self, bytes: std::io::Result<Vec<u8>>) {
+    fn on_bytes(&mut self, bytes: std::io::Result<Vec<u8>>) {
         let bytes = match bytes {
             Ok(bytes) => bytes,
             Err(error) => {
@@ -274,7 +274,7 @@ impl<L: Line> FlightStack for BoardFlight<'_, L> {
         self.next
     }
 
-    fn excite(&mut self, _: Vector3<f32>) {
+    fn set_dither(&mut self, _: Vector3<f32>) {
         // Dithered flights are for identification, which is the host's.
     }
 

@@ -1,6 +1,6 @@
 //! Flights by the firmware beside the same flights by the software.
 //!
-//! *in* plans; *out* the records of both and what the microcontroller measured; *never* a comparison of anything but bits; *source* ours.
+//! *in* plans; *out* the records of both and what the microcontroller measured; *never* a comparison of anything but bits.
 
 use impromptu_firmware::model::Model;
 use impromptu_sim::{
@@ -45,12 +45,12 @@ pub struct PilReport {
 /// If a plan cannot be flown, or the firmware refuses or breaks off.
 pub fn fly<L: Line>(
     board: &mut Board<L>,
-    plant: &Loop,
+    closed_loop: &Loop,
     plans: &[FlightPlan<'_>],
     mut flown: impl FnMut(usize),
 ) -> Result<(Vec<FlightRecord>, PilReport), PilError> {
     let recorded: Vec<FlightPlan<'_>> = plans.iter().map(|plan| FlightPlan { record: true, ..plan.clone() }).collect();
-    let mut software = plant.fly(&recorded)?;
+    let mut software = closed_loop.fly(&recorded)?;
     let mut records = Vec::with_capacity(plans.len());
     let (mut bit_identical, mut ticks, mut inference_hz) = (true, 0, 0.0f64);
     for (index, (plan, software)) in recorded.iter().zip(&mut software).enumerate() {
@@ -59,13 +59,13 @@ pub fn fly<L: Line>(
         {
             inference_hz = inference_hz.max(rate_of_inference(model));
         }
-        let mut flight = board.prepare(&plant.settings, plan.model.map(|(_, lanes)| lanes))?;
-        let mut record = fly_on(&mut flight, &plant.vehicle, &plant.settings, &plant.condition, plan)?;
+        let mut flight = board.prepare(&closed_loop.settings, plan.model.map(|(_, lanes)| lanes))?;
+        let mut record = fly_on(&mut flight, &closed_loop.vehicle, &closed_loop.settings, &closed_loop.condition, plan)?;
         flight.check()?;
         let (here, there) = (software.recorded.take().unwrap_or_default(), record.recorded.take().unwrap_or_default());
         // The software flies in groups, as long as the longest of them.
         bit_identical &= !there.answers.is_empty() && here.answers.starts_with(&there.answers);
-        ticks += plan.trajectory.samples.len() as u64 * u64::from(plant.settings.rates.position_divisor);
+        ticks += plan.trajectory.samples.len() as u64 * u64::from(closed_loop.settings.rates.position_divisor);
         records.push(record);
         flown(index + 1);
     }
@@ -75,7 +75,7 @@ pub fn fly<L: Line>(
             + inference_hz * f64::from(figures.inference_instructions_max);
         instructions * CYCLES_PER_INSTRUCTION / CORE_HZ
     };
-    let (cpu_share, cpu_share_1khz) = (share(plant.settings.rates.control_hz.into()), share(1e3));
+    let (cpu_share, cpu_share_1khz) = (share(closed_loop.settings.rates.control_hz.into()), share(1e3));
     Ok((records, PilReport { bit_identical, ticks, figures, cpu_share, cpu_share_1khz }))
 }
 

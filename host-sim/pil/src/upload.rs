@@ -1,7 +1,7 @@
 //! A model on its way into the vehicle's flash.
 //!
 //! *in* a model file; *out* a vehicle that flies it from its next start on; *never* an end before all of it is stored and checked there, unless
-//! with the reason; *source* ours. What is lost is sent again; an upload that was interrupted goes on where it was.
+//! with the reason. What is lost is sent again; an upload that was interrupted goes on where it was.
 
 use impromptu_firmware::model::file;
 use impromptu_flight::link::{CHUNK, Command, Outcome, Reason, message::ModelChunk};

@@ -123,7 +123,7 @@ fn card(condition: &str) -> ModelCard {
         lane: if refused {
             LaneOutcome::Refused("the logs carry no independent dither on the position reference".to_owned())
         } else {
-            LaneOutcome::Chosen("effort 3e-3, e_v 0.05 s², noise x1, fast clamp 0.05 m".to_owned())
+            LaneOutcome::Chosen("control weight 3e-3, e_v 0.05 s², noise x1, fast clamp 0.05 m".to_owned())
         },
         quantisation_rms_mm: Some(0.241),
     }

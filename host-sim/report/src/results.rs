@@ -101,7 +101,7 @@ pub struct Margins {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LaneOutcome {
-    /// The lane is in the model: its design in words, such as `effort 3e-3, e_v 0.05`.
+    /// The lane is in the model: its design in words, such as `control weight 3e-3, e_v 0.05`.
     Chosen(String),
     /// The model was written without the lane: why.
     Refused(String),

@@ -1,7 +1,7 @@
 //! Tables of numbers with named columns, as CSV: what every log is read from.
 //!
-//! *in* CSV with a header, the columns in any order, spaces round the cells ignored; *out* rows of finite numbers; *never* a refusal that does
-//! not name the file and, where there are any, line and column; *source* RFC 4180.
+//! *in* CSV with a header, the columns in any order, spaces round the cells ignored; *out* rows of finite numbers; *never* a
+//! refusal that does not name the file and, where there are any, line and column; *source* RFC 4180.
 
 use std::{fs::File, io, path::Path};
 

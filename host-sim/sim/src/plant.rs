@@ -1,7 +1,7 @@
 //! The vehicle in the air: a rigid body with four rotors, eight flights at once.
 //!
 //! *in*: commanded rotor speeds, air velocity and an added acceleration, a time step; *out*: the next state;
-//! *never*: a result that depends on the processor, on the lane, or on the other seven flights;
+//! *never*: a result that depends on the processor, on the member, or on the other seven flights;
 //! *source*: RotorPy 3.0.0 (Folk, Paulos, Kumar, "RotorPy: a Python-based multirotor simulator with aerodynamics for
 //! education and research", 2023), whose own derivatives and steps are the test vectors.
 //!
@@ -29,7 +29,7 @@ mod wrench;
 use pulp::Arch;
 
 pub use constants::{GRAVITY, Variation};
-pub use state::{Disturbance, LANES, Lanes, State, States};
+pub use state::{BATCH, Batch, Disturbance, State, States};
 pub use vehicle::{AttitudeGains, Inertia, PositionGains, Rotor, Vehicle, VehicleError};
 pub use wrench::Wrench;
 
@@ -50,7 +50,7 @@ enum Form {
     Full,
 }
 
-/// The equations of motion with the constants of [`LANES`] vehicles.
+/// The equations of motion with the constants of [`BATCH`] vehicles.
 #[derive(Debug, Clone)]
 pub struct Plant {
     constants: Constants,
@@ -59,8 +59,8 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// The plant of `vehicle`, each lane varied in its own way.
-    pub fn new(vehicle: &Vehicle, variations: [Variation; LANES]) -> Self {
+    /// The plant of `vehicle`, each member varied in its own way.
+    pub fn new(vehicle: &Vehicle, variations: [Variation; BATCH]) -> Self {
         let simple = vehicle.rotors.iter().all(|rotor| rotor.position[2] == 0.0)
             && vehicle.inertia.is_diagonal()
             && vehicle.flapping == 0.0
@@ -77,19 +77,19 @@ impl Plant {
     }
 
     /// Advances every flight by `duration` (s): one step of the classical Runge-Kutta method with the commanded rotor
-    /// speeds (`commands[rotor][lane]`, rad/s, clamped to the vehicle's range) and the disturbance held, then
+    /// speeds (`commands[rotor][member]`, rad/s, clamped to the vehicle's range) and the disturbance held, then
     /// normalises the quaternions, as the derivative does not keep their length.
     ///
     /// The widest vector instructions of the processor are used; no multiplication is fused with an addition, so that
     /// the bits are the same on each.
     #[inline]
-    pub fn step(&self, states: &mut States, commands: &[Lanes; 4], disturbance: &Disturbance, duration: f64) {
+    pub fn step(&self, states: &mut States, commands: &[Batch; 4], disturbance: &Disturbance, duration: f64) {
         self.step_with(self.arch, states, commands, disturbance, duration);
     }
 
     /// [`Plant::step`] on a given instruction set.
     #[inline]
-    fn step_with(&self, arch: Arch, states: &mut States, commands: &[Lanes; 4], disturbance: &Disturbance, duration: f64) {
+    fn step_with(&self, arch: Arch, states: &mut States, commands: &[Batch; 4], disturbance: &Disturbance, duration: f64) {
         let constants = &self.constants;
         match self.form {
             Form::Planar => arch.dispatch(Step::<Planar<false>>::new(constants, states, commands, disturbance, duration)),
@@ -98,8 +98,8 @@ impl Plant {
         }
     }
 
-    /// The time derivative of every flight's state: each component per second. `commands[rotor][lane]`, rad/s.
-    pub fn derivative(&self, states: &States, commands: &[Lanes; 4], disturbance: &Disturbance) -> States {
+    /// The time derivative of every flight's state: each component per second. `commands[rotor][member]`, rad/s.
+    pub fn derivative(&self, states: &States, commands: &[Batch; 4], disturbance: &Disturbance) -> States {
         match self.form {
             Form::Planar => self.derivative_of::<Planar<false>>(states, commands, disturbance),
             Form::PlanarWithLift => self.derivative_of::<Planar<true>>(states, commands, disturbance),
@@ -107,41 +107,41 @@ impl Plant {
         }
     }
 
-    fn derivative_of<M: Model>(&self, states: &States, commands: &[Lanes; 4], disturbance: &Disturbance) -> States {
+    fn derivative_of<M: Model>(&self, states: &States, commands: &[Batch; 4], disturbance: &Disturbance) -> States {
         let mut derivative = *states;
         derivative.position = states.velocity;
-        for lane in 0..LANES {
-            let state = states.lane(lane);
-            let constants = self.constants.lane(lane);
+        for member in 0..BATCH {
+            let state = states.member(member);
+            let constants = self.constants.member(member);
             let rates = wrench::derivative::<M>(
                 &self.constants,
                 &constants,
                 &Motion { velocity: state.velocity, attitude: state.attitude, body_rates: state.body_rates },
                 &state.rotor_speeds,
-                &gather(&disturbance.wind_velocity, lane),
-                &gather(&disturbance.acceleration, lane),
+                &gather(&disturbance.wind_velocity, member),
+                &gather(&disturbance.acceleration, member),
             );
-            scatter(&mut derivative.velocity, lane, &rates.velocity);
-            scatter(&mut derivative.attitude, lane, &rates.attitude);
-            scatter(&mut derivative.body_rates, lane, &rates.body_rates);
-            let commands = self.constants.clamp(gather(commands, lane));
+            scatter(&mut derivative.velocity, member, &rates.velocity);
+            scatter(&mut derivative.attitude, member, &rates.attitude);
+            scatter(&mut derivative.body_rates, member, &rates.body_rates);
+            let commands = self.constants.clamp(gather(commands, member));
             let distances = commands.iter().zip(&state.rotor_speeds);
             for (rate, (command, speed)) in derivative.rotor_speeds.iter_mut().zip(distances) {
-                rate[lane] = (command - speed) * constants.motor_rate;
+                rate[member] = (command - speed) * constants.motor_rate;
             }
         }
         derivative
     }
 
     /// Force (N) and moment about the centre of mass (N m) of the rotors and the air on the body, body FLU, without
-    /// gravity, in each lane.
-    pub fn wrench(&self, states: &States, disturbance: &Disturbance) -> [Wrench; LANES] {
-        std::array::from_fn(|lane| {
-            let state = states.lane(lane);
-            let wind = gather(&disturbance.wind_velocity, lane);
+    /// gravity, in each member.
+    pub fn wrench(&self, states: &States, disturbance: &Disturbance) -> [Wrench; BATCH] {
+        std::array::from_fn(|member| {
+            let state = states.member(member);
+            let wind = gather(&disturbance.wind_velocity, member);
             let rotation = Rotation::new(&state.attitude);
             let airspeed = rotation.to_body(&std::array::from_fn(|axis| state.velocity[axis] - wind[axis]));
-            let (shared, own) = (&self.constants, self.constants.lane(lane));
+            let (shared, own) = (&self.constants, self.constants.member(member));
             let (rates, speeds) = (&state.body_rates, &state.rotor_speeds);
             match self.form {
                 Form::Planar => Planar::<false>::wrench(shared, &own, &airspeed, rates, speeds),

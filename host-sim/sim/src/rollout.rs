@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use crate::{
     condition::Condition,
-    plant::{GRAVITY, LANES, Plant, State, States, Variation, Vehicle},
+    plant::{BATCH, GRAVITY, Plant, State, States, Variation, Vehicle},
     weather::Weather,
 };
 pub use conversion::{setpoint, settings};
@@ -36,10 +36,10 @@ pub fn fly(
     condition: &Condition,
     plans: &[FlightPlan<'_>],
 ) -> Result<Vec<FlightRecord>, RolloutError> {
-    // Flights of like length share a group, so that few lanes idle.
+    // Flights of like length share a group, so that few members idle.
     let mut order: Vec<usize> = (0..plans.len()).collect();
     order.sort_by_key(|&index| plans[index].trajectory.samples.len());
-    let groups: Vec<&[usize]> = order.chunks(LANES).collect();
+    let groups: Vec<&[usize]> = order.chunks(BATCH).collect();
     let fly = |group: &&[usize]| {
         let plans: Vec<&FlightPlan<'_>> = group.iter().map(|&index| &plans[index]).collect();
         let stacks = plans.iter().map(|plan| Software::new(vehicle, settings, condition, plan)).collect::<Result<_, _>>()?;
@@ -93,13 +93,13 @@ impl<'a, S: FlightStack> Group<'a, S> {
     ) -> Result<Self, RolloutError> {
         let rates = settings.rates;
         let tick = 1.0 / f64::from(rates.control_hz);
-        let mut variations = [Variation::default(); LANES];
-        let mut seeds = [0; LANES];
+        let mut variations = [Variation::default(); BATCH];
+        let mut seeds = [0; BATCH];
         let mut states = States::splat(&State::at_rest([0.0; 3]));
-        let mut pilots = Vec::with_capacity(LANES);
-        for (lane, (plan, stack)) in plans.iter().zip(stacks).enumerate() {
-            variations[lane] = plan.variation;
-            seeds[lane] = plan.seed;
+        let mut pilots = Vec::with_capacity(BATCH);
+        for (member, (plan, stack)) in plans.iter().zip(stacks).enumerate() {
+            variations[member] = plan.variation;
+            seeds[member] = plan.seed;
             let pilot = Pilot::new(stack, settings, condition, (*plan).clone(), tick)?;
             let hover = plan.variation.payload_factor * vehicle.mass * GRAVITY
                 / (4.0 * vehicle.thrust_coefficient * plan.variation.thrust_factor);
@@ -107,7 +107,7 @@ impl<'a, S: FlightStack> Group<'a, S> {
             let half_yaw = 0.5 * plan.trajectory.samples[0].yaw;
             state.attitude = [half_yaw.cos(), 0.0, 0.0, half_yaw.sin()];
             state.rotor_speeds = [hover.sqrt(); 4];
-            states.set_lane(lane, &state);
+            states.set_member(member, &state);
             pilots.push(pilot);
         }
         let weather = Weather::new(&condition.weather, tick, seeds)
@@ -126,13 +126,13 @@ impl<'a, S: FlightStack> Group<'a, S> {
         let divisor = self.rates.position_divisor as usize;
         let duration = 1.0 / f64::from(self.rates.control_hz);
         let ticks = self.pilots.iter().map(|pilot| pilot.plan.trajectory.samples.len()).max().unwrap_or(0) * divisor;
-        let mut commands = [[0.0; LANES]; 4];
+        let mut commands = [[0.0; BATCH]; 4];
         for tick in 0..ticks {
-            for (lane, pilot) in self.pilots.iter_mut().enumerate() {
-                let state = self.states.lane(lane);
+            for (member, pilot) in self.pilots.iter_mut().enumerate() {
+                let state = self.states.member(member);
                 let fractions = pilot.step(tick, divisor, &state);
                 for (command, fraction) in commands.iter_mut().zip(fractions) {
-                    command[lane] = fraction * self.rotor_speed_max;
+                    command[member] = fraction * self.rotor_speed_max;
                 }
             }
             self.plant.step(&mut self.states, &commands, self.weather.now(), duration);

@@ -1,7 +1,7 @@
-//! What the air does to the flights: a constant wind, gusts, and unmodelled forces, seeded lane by lane.
+//! What the air does to the flights: a constant wind, gusts, and unmodelled forces, seeded member by member.
 //!
-//! *in*: settings, tick length, a seed for each lane; *out*: the [`Disturbance`] of each tick; *never*: a lane that depends
-//! on another lane, or a source that changes because a second one is switched on; *source*: Uhlenbeck and Ornstein
+//! *in*: settings, tick length, a seed for each member; *out*: the [`Disturbance`] of each tick; *never*: a member that depends
+//! on another member, or a source that changes because a second one is switched on; *source*: Uhlenbeck and Ornstein
 //! (Phys. Rev. 36, 1930); Dryden gusts of MIL-F-8785C, low altitude.
 
 mod dryden;
@@ -12,7 +12,7 @@ use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
 
-use crate::plant::{Disturbance, LANES};
+use crate::plant::{BATCH, Disturbance};
 
 pub use dryden::Dryden;
 pub use error::WeatherError;
@@ -36,7 +36,7 @@ pub struct WeatherSettings {
     pub gusts: Option<Dryden>,
 }
 
-/// The random sources of one lane.
+/// The random sources of one member.
 #[derive(Debug, Clone)]
 struct Sources {
     acceleration: Process,
@@ -44,11 +44,11 @@ struct Sources {
     gusts: Option<Gusts>,
 }
 
-/// The weather of [`LANES`] flights.
+/// The weather of [`BATCH`] flights.
 #[derive(Debug, Clone)]
 pub struct Weather {
     mean_wind: [f64; 3],
-    lanes: [Sources; LANES],
+    members: [Sources; BATCH],
     changes: bool,
     disturbance: Disturbance,
 }
@@ -59,7 +59,7 @@ impl Weather {
     ///
     /// # Errors
     /// A setting that is not finite or out of its range.
-    pub fn new(settings: &WeatherSettings, tick: f64, seeds: [u64; LANES]) -> Result<Self, WeatherError> {
+    pub fn new(settings: &WeatherSettings, tick: f64, seeds: [u64; BATCH]) -> Result<Self, WeatherError> {
         require(tick.is_finite() && tick > 0.0, "tick", "positive (s)")?;
         let finite = settings.mean_wind.iter().all(|value| value.is_finite());
         require(finite, "mean_wind", "finite (m/s)")?;
@@ -70,7 +70,7 @@ impl Weather {
         }
         // A stream of its own for each source, so that switching one on leaves the others' bits alone.
         let stream = |seed: u64, salt: u64| Xoshiro256PlusPlus::seed_from_u64(seed ^ salt);
-        let lanes = seeds.map(|seed| Sources {
+        let members = seeds.map(|seed| Sources {
             acceleration: Process::new(&settings.acceleration, tick, stream(seed, 0x61c8_8646_80b5_83eb)),
             wind: Process::new(&settings.wind, tick, stream(seed, 0x3c6e_f372_fe94_f82b)),
             gusts: settings.gusts.as_ref().map(|gusts| {
@@ -81,7 +81,7 @@ impl Weather {
         let mut weather = Self {
             mean_wind: settings.mean_wind,
             changes: !settings.acceleration.is_still() || !settings.wind.is_still() || settings.gusts.is_some(),
-            lanes,
+            members,
             disturbance: Disturbance::default(),
         };
         weather.publish();
@@ -96,7 +96,7 @@ impl Weather {
     /// Goes on to the next tick and returns what acts during it.
     pub fn advance(&mut self) -> &Disturbance {
         if self.changes {
-            for sources in &mut self.lanes {
+            for sources in &mut self.members {
                 sources.acceleration.advance();
                 sources.wind.advance();
                 if let Some(gusts) = &mut sources.gusts {
@@ -109,11 +109,11 @@ impl Weather {
     }
 
     fn publish(&mut self) {
-        for (lane, sources) in self.lanes.iter().enumerate() {
+        for (member, sources) in self.members.iter().enumerate() {
             let random = sources.wind.value();
             let gust = sources.gusts.as_ref().map_or([0.0; 3], Gusts::value);
             let wind = std::array::from_fn(|axis| self.mean_wind[axis] + random[axis] + gust[axis]);
-            self.disturbance.set_lane(lane, wind, sources.acceleration.value());
+            self.disturbance.set_member(member, wind, sources.acceleration.value());
         }
     }
 }
@@ -122,7 +122,7 @@ impl Weather {
 mod tests {
     use super::*;
 
-    const SEEDS: [u64; LANES] = [1, 2, 3, 4, 5, 6, 7, 8];
+    const SEEDS: [u64; BATCH] = [1, 2, 3, 4, 5, 6, 7, 8];
 
     fn stormy() -> WeatherSettings {
         WeatherSettings {
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_seed_gives_the_same_bits_in_any_lane() {
+    fn the_same_seed_gives_the_same_bits_in_any_member() {
         let mut first = Weather::new(&stormy(), 0.01, SEEDS).unwrap();
         let mut seeds = SEEDS;
         seeds.reverse();
@@ -158,7 +158,7 @@ mod tests {
         for _ in 0..100 {
             let alone = alone.advance();
             assert_eq!(alone.acceleration, together.advance().acceleration);
-            assert_eq!(alone.wind_velocity, [[0.0; LANES]; 3]);
+            assert_eq!(alone.wind_velocity, [[0.0; BATCH]; 3]);
         }
     }
 

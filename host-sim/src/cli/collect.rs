@@ -3,7 +3,7 @@
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use impromptu_sim::{flight_log::FlightLog, rollout::Dither};
-use impromptu_training::{Excitation, Purpose, Recipe, Signal, files::write_log, observer::Observer as _};
+use impromptu_training::{FlightSet, Purpose, Recipe, Signal, files::write_log, observer::Observer as _};
 use serde::Serialize;
 
 use super::{Invocation, output::table, situation::Situation};
@@ -83,10 +83,10 @@ struct Log {
 
 impl Collect {
     pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
-        let plant = self.situation.plant()?;
+        let closed_loop = self.situation.closed_loop()?;
         let recipe = invocation.configuration.recipe();
-        let excitations = self.excitations(recipe);
-        if excitations.is_empty() {
+        let training_flights = self.training_flights(recipe);
+        if training_flights.is_empty() {
             bail!("the recipe names no training flights; give --signal");
         }
         let folder = invocation.configuration.folder()?;
@@ -96,17 +96,17 @@ impl Collect {
         let purpose = if dither.is_some() { Purpose::Identification } else { Purpose::Training };
         let mut first = invocation.configuration.seed_of(purpose);
         let mut logs = Vec::new();
-        for (index, excitation) in (1..).zip(&excitations) {
-            let flown = plant.collect(&excitation.motions(first), dither, first)?;
+        for (index, flight_set) in (1..).zip(&training_flights) {
+            let flown = closed_loop.collect(&flight_set.motions(first), dither, first)?;
             for (flight, log) in (1..).zip(&flown) {
-                let kind = name(excitation.signal);
+                let kind = name(flight_set.signal);
                 let dithered = if dither.is_some() { "-dithered" } else { "" };
                 let file = folder.join(format!("{index}-{kind}{dithered}-{flight:04}.csv"));
-                write_log(&log, &file)?;
+                write_log(log, &file)?;
                 logs.push(entry(log, file.display().to_string()));
             }
-            first = first.wrapping_add(u64::from(excitation.flights));
-            invocation.console.steps(index, excitations.len() as u64);
+            first = first.wrapping_add(u64::from(flight_set.flights));
+            invocation.console.steps(index, training_flights.len() as u64);
         }
         invocation.console.finish();
         let collected = Collected { seed, logs };
@@ -114,26 +114,26 @@ impl Collect {
     }
 
     /// What is flown: the recipe's flights, or those asked for with the recipe's figures where it has any.
-    fn excitations(&self, recipe: &Recipe) -> Vec<Excitation> {
-        let dithered = recipe.lane.excitation;
-        let usual = if self.dither.is_some() { vec![dithered] } else { recipe.excitations.clone() };
-        let chosen: Vec<Excitation> = match self.signal.as_slice() {
+    fn training_flights(&self, recipe: &Recipe) -> Vec<FlightSet> {
+        let dithered = recipe.lane.dithered_flights;
+        let usual = if self.dither.is_some() { vec![dithered] } else { recipe.training_flights.clone() };
+        let chosen: Vec<FlightSet> = match self.signal.as_slice() {
             [] => usual,
             names => names
                 .iter()
                 .flat_map(|name| {
                     let signal = name.signal();
-                    let found: Vec<Excitation> = usual.iter().copied().filter(|usual| usual.signal == signal).collect();
-                    if found.is_empty() { vec![Excitation { signal, ..dithered }] } else { found }
+                    let found: Vec<FlightSet> = usual.iter().copied().filter(|usual| usual.signal == signal).collect();
+                    if found.is_empty() { vec![FlightSet { signal, ..dithered }] } else { found }
                 })
                 .collect(),
         };
         chosen
             .into_iter()
-            .map(|excitation| Excitation {
-                flights: self.flights.unwrap_or(excitation.flights.min(FLIGHTS)),
-                seconds: self.seconds.unwrap_or(excitation.seconds),
-                ..excitation
+            .map(|flight_set| FlightSet {
+                flights: self.flights.unwrap_or(flight_set.flights.min(FLIGHTS)),
+                seconds: self.seconds.unwrap_or(flight_set.seconds),
+                ..flight_set
             })
             .collect()
     }

@@ -89,7 +89,7 @@ mod tests {
             ("[recipe]\ndivisor = 0", "recipe.divisor"),
             ("[recipe]\nwindow = [10, -10]", "recipe.window"),
             ("[recipe]\nwindow = [-2000, 4000]", "recipe.window"),
-            ("[recipe]\nexcitations = []", "recipe.excitations"),
+            ("[recipe]\ntraining_flights = []", "recipe.training_flights"),
             ("[recipe.lane]\nfast_limits = [0.1, nan]", "recipe.lane.fast_limits[1]"),
             ("[recipe.lane]\nerror_scale = 0.0", "recipe.lane.error_scale"),
         ] {

@@ -15,7 +15,7 @@ use impromptu_sim::{
     trajectory::{Sample, Trajectory},
 };
 use impromptu_training::{
-    Excitation, Purpose, Recipe,
+    FlightSet, Purpose, Recipe,
     channel::{AXES, Channel, of_logs, read},
     largest_sound_error,
     observer::Observer as _,
@@ -26,7 +26,7 @@ use serde::Serialize;
 
 use super::{
     Invocation,
-    situation::{milliseconds, plant},
+    situation::{closed_loop, milliseconds},
 };
 
 /// Arguments of `diagnose`.
@@ -129,14 +129,20 @@ impl Diagnose {
         invocation.console.stage("diagnosing");
         let (source, channels) = match &self.vehicle {
             Some(vehicle) => {
-                let plant = plant(vehicle, &self.gains, &self.condition)?;
-                let source = format!("{} {} {}, {}", plant.vehicle.name, plant.gains, plant.condition.name, self.test.words());
+                let closed_loop = closed_loop(vehicle, &self.gains, &self.condition)?;
+                let source = format!(
+                    "{} {} {}, {}",
+                    closed_loop.vehicle.name,
+                    closed_loop.gains,
+                    closed_loop.condition.name,
+                    self.test.words()
+                );
                 let logs = self.test.fly(
-                    &plant,
+                    &closed_loop,
                     invocation.configuration.recipe(),
                     invocation.configuration.seed_of(Purpose::Identification),
                 )?;
-                let age_s = self.delay_ms.map_or(plant.condition.measurement_delay_s, |delay| delay / 1e3);
+                let age_s = self.delay_ms.map_or(closed_loop.condition.measurement_delay_s, |delay| delay / 1e3);
                 let axis = |(index, axis): (usize, &&str)| {
                     Ok(Channel { name: (*axis).to_owned(), unit: "m", record: of_logs(&logs, index, age_s)? })
                 };
@@ -219,20 +225,20 @@ impl Test {
     }
 
     /// Logs of the test's flights.
-    fn fly(self, plant: &Loop, recipe: &Recipe, seed: u64) -> Result<Vec<FlightLog>> {
+    fn fly(self, closed_loop: &Loop, recipe: &Recipe, seed: u64) -> Result<Vec<FlightLog>> {
         match self {
             Self::Multisine => {
-                let excitation = Excitation { flights: 2, seconds: SECONDS, ..recipe.lane.excitation };
-                Ok(plant.collect(&excitation.motions(seed), None, seed)?)
+                let flight_set = FlightSet { flights: 2, seconds: SECONDS, ..recipe.lane.dithered_flights };
+                Ok(closed_loop.collect(&flight_set.motions(seed), None, seed)?)
             }
             Self::Steps => {
-                let trajectories = [seed, seed.wrapping_add(1)].map(|seed| steps(plant.rate_hz(), seed));
+                let trajectories = [seed, seed.wrapping_add(1)].map(|seed| steps(closed_loop.rate_hz(), seed));
                 let plans: Vec<FlightPlan<'_>> = trajectories
                     .iter()
                     .zip(seed..)
                     .map(|(trajectory, seed)| FlightPlan { log: true, ..FlightPlan::new(trajectory, seed) })
                     .collect();
-                Ok(plant.fly(&plans)?.into_iter().filter_map(|record| record.log).collect())
+                Ok(closed_loop.fly(&plans)?.into_iter().filter_map(|record| record.log).collect())
             }
         }
     }

@@ -66,7 +66,7 @@ struct Evaluation {
 
 impl Evaluate {
     pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
-        let plant = self.situation.plant()?.delayed(self.extra_delay_ms / 1e3);
+        let closed_loop = self.situation.closed_loop()?.delayed(self.extra_delay_ms / 1e3);
         let seed = invocation.configuration.seed();
         let files = self.model.iter().map(|path| ModelFile::read(path)).collect::<Result<Vec<_>>>()?;
         for file in &files {
@@ -80,10 +80,17 @@ impl Evaluate {
         let mut rows = Vec::new();
         let of = (files.len() * self.speed.len()) as u64;
         for &speed in &self.speed {
-            let trajectories = strokes(test_seed, self.strokes as usize, speed, plant.rate_hz())?;
-            let baseline = plant.errors(&trajectories, None, 1.0, test_seed)?;
+            let trajectories = strokes(test_seed, self.strokes as usize, speed, closed_loop.rate_hz())?;
+            let baseline = closed_loop.errors(&trajectories, None, 1.0, test_seed)?;
             for file in &files {
-                let flights = Flights { plant: &plant, trajectories: &trajectories, baseline: &baseline, speed, test_seed, seed };
+                let flights = Flights {
+                    closed_loop: &closed_loop,
+                    trajectories: &trajectories,
+                    baseline: &baseline,
+                    speed,
+                    test_seed,
+                    seed,
+                };
                 let flights = flights.of(file).with_context(|| file.name())?;
                 rows.extend(summarise(&flights).into_iter().map(|row| ModelRow { model: file.name(), row }));
                 invocation.console.steps(rows.len() as u64, of);
@@ -97,7 +104,7 @@ impl Evaluate {
 
 /// The strokes and how the baseline flew them.
 struct Flights<'a> {
-    plant: &'a Loop,
+    closed_loop: &'a Loop,
     trajectories: &'a [Trajectory],
     baseline: &'a [f64],
     speed: f64,
@@ -115,14 +122,14 @@ impl Flights<'_> {
                 continue;
             }
             let lanes = Lanes { network, feedback };
-            let errors = self.plant.errors(self.trajectories, Some((&model, lanes)), 1.0, self.test_seed)?;
+            let errors = self.closed_loop.errors(self.trajectories, Some((&model, lanes)), 1.0, self.test_seed)?;
             flights.extend(self.scored(method(&model, lanes), &errors));
         }
         Ok(flights)
     }
 
     fn scored(&self, method: Method, errors: &[f64]) -> Vec<PerFlight> {
-        per_flight(self.plant, self.trajectories, self.speed, method, errors, self.baseline, self.seed)
+        per_flight(self.closed_loop, self.trajectories, self.speed, method, errors, self.baseline, self.seed)
     }
 }
 

@@ -125,9 +125,9 @@ impl Tripped {
 
 impl Fly {
     pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
-        let plant = self.situation.plant()?.delayed(self.extra_delay_ms / 1e3);
+        let closed_loop = self.situation.closed_loop()?.delayed(self.extra_delay_ms / 1e3);
         let trajectory = match &self.trajectory {
-            Some(name) => Some(trajectory::find(name)?.scaled(self.speed).sampled(plant.rate_hz())?),
+            Some(name) => Some(trajectory::find(name)?.scaled(self.speed).sampled(closed_loop.rate_hz())?),
             None => None,
         };
         let file = self.model.as_deref().map(ModelFile::read).transpose()?;
@@ -147,11 +147,13 @@ impl Fly {
             invocation.console.note(&format!("{}: has no feedback lane, its network flies alone", file.name()));
         }
         if self.pil {
-            let strokes =
-                || strokes(invocation.configuration.seed_of(Purpose::Test), self.strokes as usize, self.speed, plant.rate_hz());
+            let strokes = || {
+                strokes(invocation.configuration.seed_of(Purpose::Test), self.strokes as usize, self.speed, closed_loop.rate_hz())
+            };
             let trajectories = trajectory.map_or_else(strokes, |trajectory| Ok(vec![trajectory]))?;
             let (speed, lanes, link) = (self.speed, self.lanes.lanes(), self.link);
-            let flights = Flights { plant: &plant, trajectories: &trajectories, speed, file: file.as_ref(), lanes, link };
+            let flights =
+                Flights { closed_loop: &closed_loop, trajectories: &trajectories, speed, file: file.as_ref(), lanes, link };
             return flights.run(invocation);
         }
         let Some(trajectory) = trajectory else { bail!("--trajectory is missing") };
@@ -167,17 +169,16 @@ impl Fly {
             methods.push(method(model, lanes));
         }
         let records =
-            plant.fly(&plans).with_context(|| file.as_ref().map_or_else(|| trajectory.name.clone(), ModelFile::name))?;
+            closed_loop.fly(&plans).with_context(|| file.as_ref().map_or_else(|| trajectory.name.clone(), ModelFile::name))?;
         if let Some(path) = &self.log {
             write_last(&records, path)?;
             invocation.console.note(&format!("log: {}", path.display()));
         }
         let baseline = records[0].rms;
         let trajectory = std::slice::from_ref(&trajectory);
-        let flights = records
-            .iter()
-            .zip(methods)
-            .flat_map(|(record, method)| per_flight(&plant, trajectory, self.speed, method, &[record.rms], &[baseline], seed));
+        let flights = records.iter().zip(methods).flat_map(|(record, method)| {
+            per_flight(&closed_loop, trajectory, self.speed, method, &[record.rms], &[baseline], seed)
+        });
         let flown = Flown {
             model: file.as_ref().map(ModelFile::name),
             extra_delay_ms: self.extra_delay_ms,

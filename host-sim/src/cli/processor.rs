@@ -20,7 +20,7 @@ const SHIFT: u32 = 3;
 
 /// What is flown through the firmware.
 pub(super) struct Flights<'a> {
-    pub(super) plant: &'a Loop,
+    pub(super) closed_loop: &'a Loop,
     pub(super) trajectories: &'a [Trajectory],
     pub(super) speed: f64,
     pub(super) file: Option<&'a ModelFile>,
@@ -42,7 +42,7 @@ struct Flown {
 impl Flights<'_> {
     /// Flies the baseline and, if there is one, the model over the trajectories, and prints the same table as the software would.
     pub(super) fn run(&self, invocation: &Invocation) -> Result<()> {
-        if self.plant.condition.command_delay_s > 0.0 {
+        if self.closed_loop.condition.command_delay_s > 0.0 {
             bail!("--pil: the firmware has no further delay to offer; leave out --extra-delay-ms");
         }
         let (seed, flight_seed) = (invocation.configuration.seed(), invocation.configuration.seed_of(Purpose::Test));
@@ -61,13 +61,13 @@ impl Flights<'_> {
         }
         let of = plans.len() as u64;
         let flown = |done: usize| invocation.console.steps(done as u64, of);
-        let (records, pil) = pil::fly(&mut board, self.plant, &plans, flown).context("--pil")?;
+        let (records, pil) = pil::fly(&mut board, self.closed_loop, &plans, flown).context("--pil")?;
         board.end();
         invocation.console.finish();
         let errors: Vec<f64> = records.iter().map(|record| record.rms).collect();
         let (baseline, with_model) = errors.split_at(flights);
         let scored = |method, errors: &[f64]| -> Vec<PerFlight> {
-            per_flight(self.plant, self.trajectories, self.speed, method, errors, baseline, seed)
+            per_flight(self.closed_loop, self.trajectories, self.speed, method, errors, baseline, seed)
         };
         let mut per_flight = scored(Method::Baseline, baseline);
         if let Some(model) = &model {

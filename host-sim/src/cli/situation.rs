@@ -24,13 +24,13 @@ pub(super) struct Situation {
 
 impl Situation {
     /// The loop that is flown.
-    pub(super) fn plant(&self) -> Result<Loop> {
-        plant(&self.vehicle, &self.gains, &self.condition)
+    pub(super) fn closed_loop(&self) -> Result<Loop> {
+        closed_loop(&self.vehicle, &self.gains, &self.condition)
     }
 }
 
 /// The loop of a vehicle with gains under a condition.
-pub(super) fn plant(vehicle: &str, gains: &str, condition: &str) -> Result<Loop> {
+pub(super) fn closed_loop(vehicle: &str, gains: &str, condition: &str) -> Result<Loop> {
     Loop::new(find_vehicle(vehicle)?, gains, find_condition(condition)?).context("--gains")
 }
 

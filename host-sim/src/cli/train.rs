@@ -9,8 +9,8 @@ use clap::Args;
 use impromptu_flight::flight::Rates;
 use impromptu_sim::{flight_log::FlightLog, flights::Loop};
 use impromptu_training::{
-    AxisGates, LearnSettings, Pipeline, Recipe, Trained, Validation, check_gates, lane::in_words, observer::Observer as _,
-    smoothing, supervised::Progress, write_model_files,
+    AxisGates, LearnSettings, Pipeline, Recipe, Trained, Validation, check_gates, in_words, observer::Observer as _, smoothing,
+    supervised::Progress, write_model_files,
 };
 use serde::Serialize;
 
@@ -18,7 +18,7 @@ use super::{
     Invocation,
     configuration::checked,
     output::table,
-    situation::{milliseconds, plant},
+    situation::{closed_loop, milliseconds},
 };
 
 /// Arguments of `train`.
@@ -90,7 +90,7 @@ struct Passed {
 /// The logs' loop: what of it is known.
 struct Origin {
     /// The simulated loop of the validation flights.
-    plant: Option<Loop>,
+    closed_loop: Option<Loop>,
     /// The loop whose signals and rates the model has.
     template: Loop,
     delay_s: f64,
@@ -164,29 +164,32 @@ impl Train {
     }
 
     fn origin(&self, recipe: &Recipe) -> Result<Origin> {
-        let known = self.vehicle.as_ref().map(|vehicle| plant(vehicle, &self.gains, &self.condition)).transpose()?;
+        let known = self.vehicle.as_ref().map(|vehicle| closed_loop(vehicle, &self.gains, &self.condition)).transpose()?;
         let delay_s = match (self.delay_ms, &known) {
             (Some(delay), _) => delay / 1e3,
-            (None, Some(plant)) => plant.condition.measurement_delay_s,
+            (None, Some(closed_loop)) => closed_loop.condition.measurement_delay_s,
             (None, None) => 0.024,
         };
         let smoothing_s = match (self.smoothing_ms, &known) {
             (Some(smoothing), _) => smoothing / 1e3,
-            (None, Some(plant)) => smoothing(recipe, plant),
+            (None, Some(closed_loop)) => smoothing(recipe, closed_loop),
             (None, None) => recipe.smoothing_s,
         };
         let template = match &known {
-            Some(plant) => plant.clone(),
-            None => plant("crazyflie", "stock", "lab")?,
+            Some(closed_loop) => closed_loop.clone(),
+            None => closed_loop("crazyflie", "stock", "lab")?,
         };
-        Ok(Origin { plant: known, template, delay_s, smoothing_s })
+        Ok(Origin { closed_loop: known, template, delay_s, smoothing_s })
     }
 }
 
 impl Origin {
     /// The training of these logs: judged in flight if there is a simulated loop.
     fn pipeline(&self, recipe: &Recipe, seed: u64) -> Result<Pipeline<'_>> {
-        let validation = self.plant.as_ref().map(|plant| Validation::strokes(recipe, plant, &recipe.validation_speeds, seed));
+        let validation = self
+            .closed_loop
+            .as_ref()
+            .map(|closed_loop| Validation::strokes(recipe, closed_loop, &recipe.validation_speeds, seed));
         Ok(Pipeline {
             settings: LearnSettings {
                 measurement_delay_s: self.delay_s,
@@ -194,7 +197,7 @@ impl Origin {
                 ..LearnSettings::new(recipe, seed)
             },
             template: &self.template,
-            known: self.plant.is_some(),
+            known: self.closed_loop.is_some(),
             validation: validation.transpose()?,
         })
     }

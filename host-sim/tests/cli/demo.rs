@@ -12,7 +12,7 @@ extra_delay_ms = 0.0
 [recipe]
 validation_strokes = 2
 validation_speeds = [1.0]
-[[recipe.excitations]]
+[[recipe.training_flights]]
 signal = 'strokes'
 flights = 6
 seconds = 0.0
@@ -28,7 +28,7 @@ epochs = 1
 learning_rate = 1e-4
 quantisation = {}
 [recipe.lane]
-efforts = [3e-2]
+control_weights = [3e-2]
 velocity_weights = [0.2]
 noise_factors = [4.0]
 fast_limits = [0.05]

@@ -22,7 +22,7 @@ epochs = 1
 learning_rate = 1e-4
 quantisation = {}
 [lane]
-efforts = [3e-2]
+control_weights = [3e-2]
 velocity_weights = [0.2]
 noise_factors = [4.0]
 fast_limits = [0.05]

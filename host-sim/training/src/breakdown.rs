@@ -1,7 +1,6 @@
 //! Flights in which the loop broke down teach nothing of the loop that shall be corrected.
 //!
-//! *in* flight logs of the baseline; *out* the sound ones, and the names of the others; *never* fewer than half of the logs;
-//! *source* ours: where motors saturate a quadrotor may tumble, and what it flies then is no answer to its reference.
+//! *in* flight logs of the baseline; *out* the sound ones, and the names of the others; *never* fewer than half of the logs. Where motors saturate a quadrotor may tumble, and what it flies then is no answer to its reference.
 
 use impromptu_sim::flight_log::FlightLog;
 

@@ -1,7 +1,7 @@
 //! From a loop to its models: fly, train, and train what the models are compared with.
 //!
-//! *in* a recipe and a simulated loop; *out* model files: the network in two number formats, the ridge regression, the flatness feed-forward;
-//! *never* a comparison that has fewer lanes than the model; *source* Zhou 2017, sections III and V.
+//! *in* a recipe and a simulated loop; *out* model files: the network in two number formats, the ridge regression, the flatness
+//! feed-forward; *never* a comparison that has fewer lanes than the model; *source* Zhou 2017, sections III and V.
 
 use impromptu_model_export::{Description, ExportError, Precision, description::LaneDescription};
 use impromptu_sim::{
@@ -11,7 +11,8 @@ use impromptu_sim::{
 
 use crate::{
     error::BuildError,
-    lane::{LaneChoice, LaneRefusal, dithered_logs, strongest_lane},
+    lane::{dithered_logs, strongest_lane},
+    lane_choice::{LaneChoice, LaneRefusal},
     learn::Learned,
     models::feedforward,
     pipeline::{Pipeline, Trained, with_monitor},
@@ -56,9 +57,9 @@ pub struct ModelSet {
 pub fn training_logs(recipe: &Recipe, closed_loop: &Loop, seed: u64) -> Result<Vec<FlightLog>, FlightsError> {
     let mut first = derived(seed, Purpose::Training);
     let mut logs = Vec::new();
-    for excitation in &recipe.excitations {
-        logs.extend(closed_loop.collect(&excitation.motions(first), None, first)?);
-        first = first.wrapping_add(u64::from(excitation.flights));
+    for flight_set in &recipe.training_flights {
+        logs.extend(closed_loop.collect(&flight_set.motions(first), None, first)?);
+        first = first.wrapping_add(u64::from(flight_set.flights));
     }
     Ok(logs)
 }

@@ -1,8 +1,8 @@
 //! Inputs that go past a network straight to its outputs.
 //!
-//! *in* a description, a network, rows of calibration; *out* the same with six inputs more; *never* another answer than the network's plus
-//! them; *source* the adapter adds a model's output to the desired state: what is to be added to something else, or to nothing, brings the
-//! difference itself.
+//! *in* a description, a network, rows of calibration; *out* the same with six inputs more; *never* another answer than the
+//! network's plus them; *source* the adapter adds a model's output to the desired state: what is to be added to something else,
+//! or to nothing, brings the difference itself.
 
 use impromptu_firmware::features::{Feature, Relative, Source};
 use impromptu_flight::quadrotor::REFERENCE;

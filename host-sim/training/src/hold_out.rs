@@ -1,7 +1,7 @@
 //! Which logs are held out of a training: those that decide when it has been long enough, and how good it is.
 //!
-//! *in* logs in their order; *out* logs to train on, and those held out; *never* a log in both; *source* hold-out validation, by whole flights:
-//! rows of one flight are too alike to judge each other.
+//! *in* logs in their order; *out* logs to train on, and those held out; *never* a log in both; *source* hold-out validation, by
+//! whole flights: rows of one flight are too alike to judge each other.
 
 /// Of so many logs one is held out.
 const EVERY: usize = 4;

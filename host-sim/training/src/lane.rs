@@ -17,66 +17,16 @@ use impromptu_model_export::{
 use impromptu_sim::{
     flight_log::FlightLog,
     flights::{FlightsError, Loop},
-    rollout::{Dither, RolloutError},
+    rollout::Dither,
 };
 use rayon::prelude::*;
 
 use crate::{
-    feedback_design::{AxisLog, DesignRefusal, DesignSettings, IdentificationData, LaneDesign, design},
+    feedback_design::{AxisLog, DesignSettings, IdentificationData, LaneDesign, design},
+    lane_choice::{LaneChoice, LaneRefusal},
     recipe::{LaneRecipe, Recipe},
     validation::Validation,
 };
-
-/// Why a model is written without a feedback lane.
-#[derive(Debug, thiserror::Error)]
-pub enum LaneRefusal {
-    /// The identification or every design was refused.
-    #[error("{axis}: {reason}")]
-    Design {
-        /// Axis that was refused.
-        axis: &'static str,
-        /// Why.
-        reason: DesignRefusal,
-    },
-    /// No design passed the validation flights.
-    #[error("of {designs} designs none passed the validation flights; the best one's worst flight was {worst:.1} % ({case})")]
-    Flights {
-        /// Designs that were flown.
-        designs: usize,
-        /// Reduction of the worst flight of the best design, per cent.
-        worst: f64,
-        /// The case in which that was.
-        case: String,
-    },
-    /// Nothing flies that could judge the designs.
-    #[error("it is chosen by simulated flights, and no vehicle was given; give --vehicle")]
-    NoFlights,
-    /// Flights could not be flown.
-    #[error(transparent)]
-    Rollout(#[from] FlightsError),
-    /// A candidate could not be encoded.
-    #[error(transparent)]
-    Export(#[from] ExportError),
-}
-
-impl From<RolloutError> for LaneRefusal {
-    fn from(error: RolloutError) -> Self {
-        Self::Rollout(error.into())
-    }
-}
-
-/// The lane that was chosen.
-#[derive(Clone, Debug)]
-pub struct LaneChoice {
-    /// What is stored.
-    pub lane: LaneDescription,
-    /// The design in words.
-    pub design: String,
-    /// Score: weighted mean over the cases of 90 % of the (geometric) average and 10 % of the worst reduction, per cent.
-    pub score: f64,
-    /// Worst reduction over all validation flights, per cent.
-    pub worst: f64,
-}
 
 /// One design, ready to be flown.
 struct Candidate {
@@ -143,10 +93,10 @@ pub(crate) fn identification(logs: &[FlightLog], lags: usize) -> Result<[Identif
 fn candidates(recipe: &LaneRecipe, logs: &[FlightLog]) -> Result<Vec<Candidate>, LaneRefusal> {
     let data = identification(logs, recipe.design.margin_lags)?;
     let mut grid = Vec::new();
-    for &effort in &recipe.efforts {
+    for &control_weight in &recipe.control_weights {
         for &velocity_weight in &recipe.velocity_weights {
             for &noise_factor in &recipe.noise_factors {
-                grid.push(DesignSettings { effort, velocity_weight, noise_factor, ..recipe.design.clone() });
+                grid.push(DesignSettings { control_weight, velocity_weight, noise_factor, ..recipe.design.clone() });
             }
         }
     }
@@ -173,8 +123,8 @@ fn candidates(recipe: &LaneRecipe, logs: &[FlightLog]) -> Result<Vec<Candidate>,
             candidates.push(Candidate {
                 lane: describe(&[&horizontal, &horizontal, &vertical], fast_limit, scale, recipe),
                 design: format!(
-                    "effort {}, e_v {}, noise x{}, fast clamp {} m (half of it at {} m/s²)",
-                    settings.effort, settings.velocity_weight, settings.noise_factor, fast_limit, scale
+                    "control weight {}, e_v {}, noise x{}, fast clamp {} m (half of it at {} m/s²)",
+                    settings.control_weight, settings.velocity_weight, settings.noise_factor, fast_limit, scale
                 ),
             });
         }
@@ -242,9 +192,9 @@ fn worst_margins(designs: &[&LaneDesign; 3]) -> Margins {
 ///
 /// # Errors
 /// If they cannot be flown.
-pub fn dithered_logs(recipe: &LaneRecipe, plant: &Loop, seed: u64) -> Result<Vec<FlightLog>, FlightsError> {
+pub fn dithered_logs(recipe: &LaneRecipe, closed_loop: &Loop, seed: u64) -> Result<Vec<FlightLog>, FlightsError> {
     let dither = Dither { amplitude: recipe.dither, hold_s: recipe.dither_hold_s };
-    plant.collect(&recipe.excitation.motions(seed), Some(dither), seed)
+    closed_loop.collect(&recipe.dithered_flights.motions(seed), Some(dither), seed)
 }
 
 /// How one design flew.
@@ -268,16 +218,19 @@ fn flown(
     let cases = &CASES;
     // What a lane does by itself is judged, not what the guard makes of it.
     let Validation { closed_loop, trajectories: validation, seed } = validation;
-    let (plant, seed) = (&closed_loop.unguarded(), *seed);
-    let loops: Vec<Loop> = cases.iter().map(|case| plant.delayed(case.delay_s)).collect();
+    let (closed_loop, seed) = (&closed_loop.unguarded(), *seed);
+    let loops: Vec<Loop> = cases.iter().map(|case| closed_loop.delayed(case.delay_s)).collect();
     let baselines: Vec<Vec<f64>> =
-        loops.iter().map(|plant| plant.errors(validation, None, 1.0, seed)).collect::<Result<_, _>>()?;
+        loops.iter().map(|closed_loop| closed_loop.errors(validation, None, 1.0, seed)).collect::<Result<_, _>>()?;
     let network_alone: Vec<Vec<f64>> = match candidates.first() {
         Some(candidate) => {
             let bytes = encode(&candidate.lane)?;
             let model = Model::from_bytes(&bytes).map_err(ExportError::Refused)?;
             let lanes = Lanes { network: true, feedback: false };
-            loops.iter().map(|plant| plant.errors(validation, Some((&model, lanes)), 1.0, seed)).collect::<Result<_, _>>()?
+            loops
+                .iter()
+                .map(|closed_loop| closed_loop.errors(validation, Some((&model, lanes)), 1.0, seed))
+                .collect::<Result<_, _>>()?
         }
         None => Vec::new(),
     };
@@ -287,10 +240,10 @@ fn flown(
             let bytes = encode(&candidate.lane)?;
             let model = Model::from_bytes(&bytes).map_err(ExportError::Refused)?;
             let mut score = Score { mean: 0.0, worst: f64::INFINITY, worst_case: "", over_network: f64::INFINITY };
-            for (place, (((case, plant), baseline), alone)) in
+            for (place, (((case, closed_loop), baseline), alone)) in
                 cases.iter().zip(&loops).zip(&baselines).zip(&network_alone).enumerate()
             {
-                let errors = plant.errors(validation, Some((&model, Lanes::BOTH)), case.loop_gain, seed)?;
+                let errors = closed_loop.errors(validation, Some((&model, Lanes::BOTH)), case.loop_gain, seed)?;
                 let worst = worst_to_answer_for(baseline, alone, &errors);
                 // The geometric mean: halving a small error counts as much as halving a large one.
                 let logs = baseline.iter().zip(&errors).map(|(baseline, error)| (error / baseline).ln());
@@ -322,14 +275,6 @@ fn worst_to_answer_for(baseline: &[f64], network_alone: &[f64], errors: &[f64]) 
 /// beyond it, a share is taken off the score: it is one flight of many.
 const LOSS_AGAINST_NETWORK: f64 = 1.0;
 const LOSS_SHARE: f64 = 0.2;
-
-/// What a model remarks of its feedback lane, or of why it has none.
-pub fn in_words(lane: &Result<LaneChoice, LaneRefusal>) -> String {
-    match lane {
-        Ok(choice) => format!("feedback lane: {}", choice.design),
-        Err(reason) => format!("no feedback lane: {reason}"),
-    }
-}
 
 /// Designs lanes from dithered `logs` and chooses one by `validation` flights. `encode` makes a
 /// model file with a lane; the network lane flies too.

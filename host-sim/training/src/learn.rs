@@ -1,7 +1,7 @@
 //! From logs to networks: ridge regression, the network that refines it, the same fine-tuned for int8.
 //!
-//! *in* settings, logs of the baseline; *out* networks, and what a description needs of their rows; *never* a row of a log that is held out;
-//! *source* Zhou 2017, section III-A.
+//! *in* settings, logs of the baseline; *out* networks, and what a description needs of their rows; *never* a row of a log that
+//! is held out; *source* Zhou 2017, section III-A.
 
 use impromptu_flight::quadrotor::REFERENCE;
 use impromptu_model_export::{Batch, Description, ExportError, FloatNetwork, Precision, encode};
@@ -169,8 +169,8 @@ impl Rows {
     }
 }
 
-/// Learns from logs of the baseline, some of which are held out to decide when a training has been long enough. `judge` chooses between
-/// the recipe's candidates, which should be done in flight; without it the logs held out decide by rows.
+/// Learns from logs of the baseline, some of which are held out to decide when a training has been long enough. `judge` chooses
+/// between the recipe's candidates, which should be done in flight; without it the logs held out decide by rows.
 ///
 /// # Errors
 /// If the logs hold too little or the training fails.
@@ -210,8 +210,8 @@ pub fn learn(
         networks.into_iter().nth(index).ok_or(LearnError::NoCandidate)
     };
     let network = choose(candidates, Precision::Float)?;
-    // The exporter rounds with the error of one weight made good by the others, which training cannot imitate: whether the fine-tuning
-    // helps is seen in flight.
+    // The exporter rounds with the error of one weight made good by the others, which training cannot imitate: whether the
+    // fine-tuning helps is seen in flight.
     let exported = match precision {
         Precision::Float => network.clone(),
         Precision::Int8 | Precision::Int16 => {

@@ -20,7 +20,7 @@
 //! | 2 | `examples`, `gates`, `recipe` | rows of features from logs; the diagnosis before a training; everything that decides, as data |
 //! | 3 | `learn` | logs to networks |
 //! | 4 | `error`, `files`, `models` | why there are no models; files written whole; descriptions |
-//! | 5 | `validation` | flights that judge |
+//! | 5 | `validation`, `lane_choice` | flights that judge; what comes of the choice of a lane |
 //! | 6 | `lane` | the feedback lane, chosen in flight |
 //! | 7 | `monitor` | what the guard is told of the loop |
 //! | 8 | `pipeline` | from logs to a model file |
@@ -37,6 +37,7 @@ pub mod files;
 pub mod gates;
 pub mod hold_out;
 pub mod lane;
+pub mod lane_choice;
 pub mod learn;
 pub mod models;
 pub mod monitor;
@@ -54,12 +55,13 @@ pub use error::BuildError;
 pub use examples::Labels;
 pub use files::{write_log, write_model_files};
 pub use gates::{AxisGates, check_gates};
-pub use lane::{LaneChoice, LaneRefusal, choose_lane, dithered_logs, lanes, strongest_lane};
+pub use lane::{choose_lane, dithered_logs, lanes, strongest_lane};
+pub use lane_choice::{LaneChoice, LaneRefusal, in_words};
 pub use learn::{Candidates, Judge, LearnError, LearnSettings, Learned, Rows, learn};
 pub use models::{describe, feedforward};
-pub use monitor::{monitor, promise};
+pub use monitor::{monitor, validated_rms};
 pub use observer::Observer;
 pub use pipeline::{Pipeline, Trained, smoothing};
 pub use purpose::{Purpose, derived};
-pub use recipe::{Excitation, LaneRecipe, Recipe, Signal};
+pub use recipe::{FlightSet, LaneRecipe, Recipe, Signal};
 pub use validation::{Validation, best_in_flight};

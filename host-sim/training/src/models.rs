@@ -1,7 +1,7 @@
 //! What models say of themselves, and the model that needs no training.
 //!
-//! *in* a recipe, a loop, rows; *out* a [`Description`]; *never* limits that the training flights did not ask for; *source* the flatness
-//! feed-forward is Zhou 2017, section V.
+//! *in* a recipe, a loop, rows; *out* a [`Description`]; *never* limits far above the corrections of the training flights;
+//! *source* differential flatness for the feed-forward.
 
 use impromptu_firmware::{
     features::{Feature, Relative, Source},
@@ -40,7 +40,7 @@ fn outputs(rows: &Rows, lane: Option<&LaneDescription>) -> Vec<Output> {
 /// Description of a model of a loop, without a monitor.
 pub fn describe(
     recipe: &Recipe,
-    plant: &Loop,
+    closed_loop: &Loop,
     rows: &Rows,
     lane: Option<&LaneDescription>,
     name: &str,
@@ -50,9 +50,9 @@ pub fn describe(
     Description {
         name: name.into(),
         provenance: Provenance {
-            vehicle: plant.vehicle.name.clone(),
-            gains: plant.gains.clone(),
-            condition: plant.condition.name.clone(),
+            vehicle: closed_loop.vehicle.name.clone(),
+            gains: closed_loop.gains.clone(),
+            condition: closed_loop.condition.name.clone(),
             software: format!("host-sim {}", env!("CARGO_PKG_VERSION")),
             seed,
             data_crc: rows.data_crc,
@@ -60,10 +60,10 @@ pub fn describe(
         },
         signals: Signals::from(&quadrotor::signals()),
         timing: Timing {
-            reference_rate_hz: plant.rate_hz() as f32,
+            reference_rate_hz: closed_loop.rate_hz() as f32,
             divisor: recipe.divisor,
             interpolation: recipe.interpolation,
-            measurement_delay_s: plant.condition.measurement_delay_s as f32,
+            measurement_delay_s: closed_loop.condition.measurement_delay_s as f32,
             fade_s: recipe.fade_s as f32,
         },
         features: recipe.features(),

@@ -6,8 +6,8 @@
 //! dithered logs ──► feedback lane ──► description ──► monitor ──► model file         complete()
 //! ```
 //!
-//! *in* what is learned and how, logs, and a simulated loop where there is one; *out* networks, and a model file; *never* a lane or a monitor that
-//! no flight has judged: without a simulated loop there is neither; *source* Zhou 2017, sections III and V.
+//! *in* what is learned and how, logs, and a simulated loop where there is one; *out* networks, and a model file; *never* a lane
+//! or a monitor that no flight has judged: without a simulated loop there is neither; *source* Zhou 2017, sections III and V.
 
 use impromptu_model_export::{
     Description, ExportError,
@@ -20,10 +20,11 @@ use impromptu_sim::{
 
 use crate::{
     error::BuildError,
-    lane::{LaneChoice, LaneRefusal, choose_lane, in_words},
+    lane::choose_lane,
+    lane_choice::{LaneChoice, LaneRefusal, in_words},
     learn::{Candidates, Judge, LearnError, LearnSettings, Learned, Rows, learn},
     models::describe,
-    monitor::{monitor, promise},
+    monitor::{monitor, validated_rms},
     recipe::Recipe,
     supervised::Progress,
     validation::{Validation, best_in_flight},
@@ -44,8 +45,8 @@ pub struct Pipeline<'a> {
     pub template: &'a Loop,
     /// Whether that is the loop that was logged: if not, the model does not say of what vehicle it is.
     pub known: bool,
-    /// Flights of a simulated loop that judge networks and feedback lanes, and tell what the guard may expect. Without them rows judge the
-    /// networks, and the model has neither lane nor monitor.
+    /// Flights of a simulated loop that judge networks and feedback lanes, and tell what the guard may expect. Without them rows
+    /// judge the networks, and the model has neither lane nor monitor.
     pub validation: Option<Validation<'a>>,
 }
 
@@ -94,8 +95,8 @@ impl<'a> Pipeline<'a> {
         learn(&self.settings, logs, in_flight.as_ref().map(|judge| judge as &Judge<'_>), progress)
     }
 
-    /// A model file of what was learned: with a feedback lane and a monitor from `identification`, logs with dither, if flights can judge
-    /// them. `remark` follows what is remarked of the lane.
+    /// A model file of what was learned: with a feedback lane and a monitor from `identification`, logs with dither, if flights
+    /// can judge them. `remark` follows what is remarked of the lane.
     ///
     /// # Errors
     /// If flights fail or the model cannot be encoded; a refused feedback lane is no error.
@@ -155,7 +156,7 @@ pub(crate) fn with_monitor(
     description.monitor = None;
     let mut model = encode(&description)?;
     if let Some(monitor) = monitor {
-        let validated_rms = promise(validation, &model)?;
+        let validated_rms = validated_rms(validation, &model)?;
         description.monitor = Some(MonitorDescription { validated_rms, ..monitor });
         model = encode(&description)?;
     }

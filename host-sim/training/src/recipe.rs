@@ -31,7 +31,7 @@ pub enum Signal {
 /// Training flights of one kind.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Validate)]
 #[serde(deny_unknown_fields)]
-pub struct Excitation {
+pub struct FlightSet {
     /// Form.
     #[garde(skip)]
     pub signal: Signal,
@@ -52,7 +52,7 @@ pub struct Excitation {
     pub shortest_s: f64,
 }
 
-impl Excitation {
+impl FlightSet {
     /// The motions to be flown, from `seed` on.
     pub fn motions(&self, seed: u64) -> Vec<Motion> {
         let Self { max_speed, max_acceleration, seconds, shortest_s, .. } = *self;
@@ -88,16 +88,18 @@ impl Excitation {
 pub struct LaneRecipe {
     /// Flights with dither.
     #[garde(dive)]
-    pub excitation: Excitation,
+    #[serde(alias = "excitation")]
+    pub dithered_flights: FlightSet,
     /// Amplitude of the dither, m.
     #[garde(custom(positive))]
     pub dither: f64,
     /// Time between new signs of the dither, s.
     #[garde(custom(positive))]
     pub dither_hold_s: f64,
-    /// Efforts tried.
+    /// Control weights of the design tried.
     #[garde(length(min = 1), inner(custom(positive)))]
-    pub efforts: Vec<f64>,
+    #[serde(alias = "efforts")]
+    pub control_weights: Vec<f64>,
     /// Weights on the velocity error tried, s².
     #[garde(length(min = 1), inner(custom(not_negative)))]
     pub velocity_weights: Vec<f64>,
@@ -127,7 +129,7 @@ pub struct LaneRecipe {
 impl Default for LaneRecipe {
     fn default() -> Self {
         Self {
-            excitation: Excitation {
+            dithered_flights: FlightSet {
                 signal: Signal::Multisine,
                 flights: 10,
                 seconds: 90.0,
@@ -137,7 +139,7 @@ impl Default for LaneRecipe {
             },
             dither: 0.01,
             dither_hold_s: 0.05,
-            efforts: vec![3e-3, 6e-3, 1.2e-2],
+            control_weights: vec![3e-3, 6e-3, 1.2e-2],
             velocity_weights: vec![0.05, 0.2],
             noise_factors: vec![2.0],
             fast_limits: vec![0.1, 0.15],
@@ -180,7 +182,8 @@ pub struct Recipe {
     pub stride: usize,
     /// Training flights.
     #[garde(length(min = 1), dive)]
-    pub excitations: Vec<Excitation>,
+    #[serde(alias = "excitations")]
+    pub training_flights: Vec<FlightSet>,
     /// Penalty of the ridge regression.
     #[garde(custom(not_negative))]
     pub ridge_penalty: f64,
@@ -210,7 +213,7 @@ pub struct Recipe {
 impl Default for Recipe {
     fn default() -> Self {
         // Strokes are as long as they are; their acceleration follows from the speed.
-        let strokes = |speed: f64, flights: u32| Excitation {
+        let strokes = |speed: f64, flights: u32| FlightSet {
             signal: Signal::Strokes,
             flights,
             seconds: 0.0,
@@ -228,7 +231,7 @@ impl Default for Recipe {
             smoothing_s: 0.06,
             stride: 5,
             // What the baseline flies is slower than what it is asked for: to learn how 1.7x is flown, ask for 2x.
-            excitations: vec![strokes(1.0, 300), strokes(1.35, 300), strokes(1.7, 300), strokes(2.0, 200)],
+            training_flights: vec![strokes(1.0, 300), strokes(1.35, 300), strokes(1.7, 300), strokes(2.0, 200)],
             ridge_penalty: 1e-6,
             network: TrainingSettings { epochs: 55, learning_rate: 2e-3, ..TrainingSettings::default() },
             weight_decays: vec![0.03, 0.2],

@@ -1,7 +1,8 @@
 //! Simulated flights that judge: which network flies best.
 //!
-//! *in* a loop, trajectories, candidates; *out* the best of them; *never* a test flight, nor a flight that the guard saved; *source* Zhou 2017,
-//! section V: what counts is the error in flight, not on rows.
+//! *in* a loop, trajectories, candidates; *out* the best of them; *never* a test flight, nor a flight that the guard saved;
+//! *source* Zhou 2017 compares modules by the error in flight. Errors on rows do not tell it: poor training signals are fitted
+//! best and flown worst.
 
 use impromptu_firmware::{adapter::Lanes, model::Model};
 use impromptu_model_export::{ExportError, FloatNetwork, Precision, encode};
@@ -49,8 +50,8 @@ const LATE_S: f64 = 0.02;
 /// A network may be this much worse than the ridge regression in any kind of validation flight, points.
 const LOSS_AGAINST_RIDGE: f64 = 0.1;
 
-/// The candidate with the best mean reduction over the validation flights, nominal and late, each speed by itself; first come those
-/// that are nowhere worse than the ridge regression on the same features.
+/// The candidate with the best mean reduction over the validation flights, nominal and late, each speed by itself; first come
+/// those that are nowhere worse than the ridge regression on the same features.
 ///
 /// # Errors
 /// If a candidate cannot be encoded or flown.

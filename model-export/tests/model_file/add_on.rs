@@ -1,4 +1,5 @@
-//! The add-on is the adapter with the trajectory ahead of it: the same bits, in place too, and the desired reference without a model.
+//! The add-on is the adapter with the trajectory ahead of it: the same bits, in place too, and the desired reference without a
+//! model.
 
 use impromptu_firmware::{
     adapter::{Adapter, Lanes},
@@ -18,6 +19,13 @@ const CAPACITY: usize = 128;
 const AHEAD: i32 = 60;
 type Cart<'m> = AddOn<'m, 2, 2, 2, CAPACITY>;
 
+/// The report of an add-on that has done nothing.
+fn nothing(next_tick: i32) -> Report {
+    let mut report = Report::default();
+    report.next_tick = next_tick;
+    report
+}
+
 fn bits(values: [f32; 2]) -> [u32; 2] {
     values.map(f32::to_bits)
 }
@@ -27,7 +35,9 @@ proptest! {
 
     /// Whole ticks, and ticks whose network is evaluated later, whatever was in the add-on's place before.
     #[test]
-    fn an_add_on_gives_the_bits_of_an_adapter(seed in any::<u64>(), first in -500i32..500, linear in any::<bool>(), delay in 0i32..10) {
+    fn an_add_on_gives_the_bits_of_an_adapter(
+        seed in any::<u64>(), first in -500i32..500, linear in any::<bool>(), deferred in any::<bool>(),
+    ) {
         let interpolation = if linear { Interpolation::Linear } else { Interpolation::Hold };
         let (description, bytes) = violent(seed, interpolation);
         let model = Model::from_bytes(&bytes).unwrap();
@@ -40,17 +50,19 @@ proptest! {
         split.bypass(&table).unwrap();
         split.push([9.0, 9.0]).unwrap();
         split.load(&model, &table, 100.0).unwrap();
-        if linear {
+        // A ramped correction needs the inference until the next tick, a held one at once.
+        let deferred = linear && deferred;
+        if deferred {
             split.defer();
         }
-        let (mut numbers, mut scratch, mut waiting) = (Numbers(seed ^ 1), Scratch::new(), None);
+        let (mut numbers, mut scratch) = (Numbers(seed ^ 1), Scratch::new());
         let mut push = |preview: &mut Preview<2, CAPACITY>, add_ons: [&mut Cart<'_>; 2]| {
             let sample = [numbers.next(), numbers.next()];
             preview.push(sample);
-            add_ons.map(|add_on| add_on.push(sample).unwrap());
+            add_ons.into_iter().for_each(|add_on| add_on.push(sample).unwrap());
         };
-        whole.restart(first);
-        split.restart(first);
+        whole.clear(first);
+        split.clear(first);
         adapter.switch(Lanes::BOTH);
         whole.switch(Lanes::BOTH);
         split.switch(Lanes::BOTH);
@@ -61,15 +73,13 @@ proptest! {
             let measured = [measure.next(), measure.next()];
             let expected = adapter.step(tick, &preview, &measured, &mut scratch);
             prop_assert_eq!(bits(whole.step(tick, &measured, &mut scratch)), bits(expected), "tick {}", tick);
-            // A held correction is wanted at once, a ramped one within the sub-rate tick of ten.
-            let later = if linear { delay } else { 0 };
-            if let Some(job) = split.begin(tick, &measured) {
-                waiting = Some((tick + later, job.run(model.network().unwrap(), &mut scratch)));
-            }
-            if waiting.as_ref().is_some_and(|(due, _)| *due <= tick) {
-                split.deliver(waiting.take().unwrap().1);
+            let job = split.begin(tick, &measured);
+            let mut inference = job.map(|job| job.run(model.network().unwrap(), &mut scratch));
+            if !deferred {
+                inference.take().into_iter().for_each(|inference| split.deliver(inference));
             }
             prop_assert_eq!(bits(split.finish(tick, &measured)), bits(expected), "tick {}", tick);
+            inference.into_iter().for_each(|inference| split.deliver(inference));
             let report = Report::of(&adapter, preview.next_tick());
             prop_assert_eq!((whole.report(), split.report()), (report, report));
         }
@@ -87,9 +97,7 @@ fn without_a_model_the_reference_is_the_desired_one() {
     assert_eq!(bits(add_on.step(0, &[f32::NAN, 1.0], &mut Scratch::new())), bits([1.5, -0.0]));
     // The end rules are those of the table: the position holds, the velocity vanishes.
     assert_eq!(add_on.step(1, &[0.0; 2], &mut Scratch::new()), [1.5, 0.0]);
-    let mut report = Report::default();
-    report.next_tick = 1;
-    assert!(add_on.guard().is_none() && add_on.report() == report);
+    assert!(add_on.guard().is_none() && add_on.report() == nothing(1));
     // A table in another order is followed by its names.
     let swapped = [table.reference[1], table.reference[0]];
     let signals = Channels { reference: &swapped, ..Channels::from(&table) };
@@ -124,25 +132,27 @@ fn a_refused_model_and_a_refused_sample_change_nothing() {
     assert_eq!(add_on.push([1.0, f32::NAN]), Err(NotFinite { channel: 1 }));
     assert_eq!(add_on.push([f32::INFINITY, f32::NAN]), Err(NotFinite { channel: 0 }));
     assert_eq!((add_on.next_tick(), add_on.desired(0)), (1, [1.0, 2.0]));
-    assert_eq!(add_on.step(0, &[0.0; 2], &mut Scratch::new()), [1.25, 2.5]);
+    assert_eq!(add_on.step(0, &[0.0; 2], &mut Scratch::new()), [1.1, 2.5]);
 }
 
 #[test]
-fn a_reset_keeps_the_wanted_lanes_and_a_restart_their_fade() {
+fn clearing_keeps_the_fade_a_reset_the_wanted_lanes_and_a_restart_neither() {
     let mut description = description(1);
     description.timing.fade_s = 0.04;
     let bytes = constant_model(description.clone(), [0.25, 0.5]);
     let model = Model::from_bytes(&bytes).unwrap();
     let mut add_on = Cart::new(&model, &table(&description), 100.0).unwrap();
     add_on.switch(Lanes { network: true, feedback: false });
-    let mut weight = |add_on: &mut Cart<'_>, tick| {
+    let weight = |add_on: &mut Cart<'_>, tick| {
         add_on.push([0.0; 2]).unwrap();
         add_on.step(tick, &[0.0; 2], &mut Scratch::new());
         add_on.report().network_weight
     };
     assert_eq!([0, 1, 2, 3].map(|tick| weight(&mut add_on, tick)), [0.25, 0.5, 0.75, 1.0]);
-    add_on.restart(20);
+    add_on.clear(20);
     assert_eq!((weight(&mut add_on, 20), add_on.report().next_tick), (1.0, 21));
     add_on.reset(0);
     assert_eq!((weight(&mut add_on, 0), add_on.report().next_tick), (0.25, 1));
+    add_on.restart(-5);
+    assert_eq!((weight(&mut add_on, -5), add_on.report()), (0.0, nothing(-4)));
 }

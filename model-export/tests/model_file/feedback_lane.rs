@@ -1,8 +1,8 @@
 //! The feedback lane in the adapter and by itself.
 
 use impromptu_firmware::{
+    AddOn,
     adapter::Lanes,
-    add_on::AddOn,
     feedback::AxisState,
     guard::GuardSettings,
     model::{Model, Output},
@@ -41,7 +41,7 @@ fn corrections(
     let mut add_on = AddOn::<2, 2, 2, CAPACITY>::new(&model, &table(&description), 100.0).unwrap();
     add_on.set_guard(GuardSettings::OFF);
     add_on.switch(Lanes { network: false, feedback: true });
-    add_on.restart(-16);
+    add_on.clear(-16);
     (-16..0).for_each(|tick| add_on.push(desired(tick)).unwrap());
     let step = |tick| {
         add_on.push(desired(tick)).unwrap();

@@ -1,8 +1,8 @@
 //! The add-on knows no quadrotor: the first system of Zhou 2017 (equation 9), flown with the exact inverse as a linear map.
 
 use impromptu_firmware::{
+    AddOn,
     adapter::Lanes,
-    add_on::AddOn,
     features::{Feature, Relative, Source},
     model::{Interpolation, Model, Output},
     network::Scratch,

@@ -86,7 +86,7 @@ fn setpoint(reference_tick: u32) -> Setpoint {
     Setpoint { position: position.cast(), velocity: velocity.cast(), acceleration: acceleration.cast(), yaw: yaw as f32 }
 }
 
-/// Flies and records `ticks` control ticks. `switches` says what is switched before a tick: lanes or excitation.
+/// Flies and records `ticks` control ticks. `switches` says what is switched before a tick: lanes or dither.
 ///
 /// # Panics
 /// If the vehicle does not stay near its trajectory: such a flight would prove little.
@@ -121,7 +121,7 @@ pub(crate) fn fly(addon: Option<(&Model<'_>, Lanes)>, ticks: u32, switches: impl
             event.prepare(&mut flight);
             match event {
                 Event::Lanes(lanes) => recorder.lanes(lanes),
-                Event::Excitation(offset) => recorder.excitation(offset),
+                Event::Dither(offset) => recorder.dither(offset),
                 other => panic!("{other:?} is no switch"),
             }
         }

@@ -28,12 +28,12 @@ fn rows(table: &mut String, flight: &str, report: &Value) {
     writeln!(table, "{flight:<30} stack bytes: {} to load, {} in flight", stack["load"], stack["flight"]).unwrap();
 }
 
-/// Lanes that come and go in flight, with an excitation in between.
+/// Lanes that come and go in flight, with a dither in between.
 fn switching(tick: u32) -> Option<Event> {
     match tick {
         1_003 => Some(Event::Lanes(Lanes::BOTH)),
-        2_000 => Some(Event::Excitation(Vector3::new(0.02, -0.02, 0.01))),
-        2_501 => Some(Event::Excitation(Vector3::zeros())),
+        2_000 => Some(Event::Dither(Vector3::new(0.02, -0.02, 0.01))),
+        2_501 => Some(Event::Dither(Vector3::zeros())),
         3_333 => Some(Event::Lanes(Lanes { network: false, feedback: true })),
         4_000 => Some(Event::Lanes(Lanes::NONE)),
         5_555 => Some(Event::Lanes(Lanes { network: true, feedback: false })),

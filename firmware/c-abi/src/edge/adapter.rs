@@ -19,8 +19,8 @@ use crate::{
 
 /// Creates an adapter in `adapter`, which has `size` bytes, for a loop whose references run at `rate_hz`. Both lanes are off.
 ///
-/// `signals` is compared with the model's table, name by name; NULL takes the model's for the application's. The model must live as
-/// long as the adapter. The first sample pushed will be that of reference tick `first_tick`. Needs up to 4 KB of stack.
+/// `signals` is compared with the model's table, name by name; NULL takes the model's for the application's. The model must live
+/// as long as the adapter. The first sample pushed will be that of reference tick `first_tick`. Needs up to 4 KB of stack.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_adapter_create(
     adapter: *mut AdapterMemory,
@@ -42,9 +42,9 @@ pub unsafe extern "C" fn impromptu_adapter_create(
     }
 }
 
-/// impromptu_adapter_create for the signals of a quadrotor, as the flight stack has them: 10 desired channels (position, velocity,
-/// acceleration, yaw), 13 measured (position, velocity, roll, pitch, yaw, body rates, vertical acceleration without gravity), 6
-/// references (position, velocity). m, s, rad; world ENU, body FLU, pitch positive nose down.
+/// impromptu_adapter_create for the signals of a quadrotor, as the flight stack has them: 10 desired channels (position,
+/// velocity, acceleration, yaw), 13 measured (position, velocity, roll, pitch, yaw, body rates, vertical acceleration without
+/// gravity), 6 references (position, velocity). m, s, rad; world ENU, body FLU, pitch positive nose down.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_adapter_create_quadrotor(
     adapter: *mut AdapterMemory,
@@ -74,12 +74,12 @@ unsafe fn fill(
         &mut *stage
     };
     stage.load(model, table, rate_hz)?;
-    stage.restart(first_tick);
+    stage.clear(first_tick);
     Ok(())
 }
 
-/// Appends the desired channels of the next reference tick. Push as far ahead as impromptu_description.future says; what is missing
-/// is taken as the trajectory's end.
+/// Appends the desired channels of the next reference tick. Push as far ahead as impromptu_description.future says; what is
+/// missing is taken as the trajectory's end.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_adapter_push(adapter: *mut AdapterMemory, desired: *const f32, count: usize) -> Status {
     report(|| {
@@ -95,7 +95,7 @@ pub unsafe extern "C" fn impromptu_adapter_push(adapter: *mut AdapterMemory, des
 pub unsafe extern "C" fn impromptu_adapter_restart(adapter: *mut AdapterMemory, first_tick: i32) -> Status {
     report(|| {
         // SAFETY: the module's rules.
-        unsafe { object::<Stage>(adapter)?.restart(first_tick) };
+        unsafe { object::<Stage>(adapter)?.clear(first_tick) };
         Ok(())
     })
 }
@@ -147,8 +147,8 @@ pub unsafe extern "C" fn impromptu_adapter_step(
     })
 }
 
-/// First part of a reference tick. Sets `due` to 1 and writes `job` if the network is to be evaluated (impromptu_job_run), else sets it to 0
-/// and leaves `job` alone. The inference is given to impromptu_adapter_deliver by whoever calls the adapter, before
+/// First part of a reference tick. Sets `due` to 1 and writes `job` if the network is to be evaluated (impromptu_job_run), else
+/// sets it to 0 and leaves `job` alone. The inference is given to impromptu_adapter_deliver by whoever calls the adapter, before
 /// impromptu_adapter_finish or, after impromptu_adapter_defer, before the next impromptu_adapter_begin.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_adapter_begin(

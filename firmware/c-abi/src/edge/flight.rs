@@ -69,8 +69,8 @@ pub unsafe extern "C" fn impromptu_flight_switch(flight: *mut FlightMemory, netw
     })
 }
 
-/// One control tick, the network included. Ticks count from 0. A state that is not finite gives IMPROMPTU_STATUS_NOT_FINITE and no
-/// command: what the motors then do is the caller's decision. Needs up to 4 KB of stack.
+/// One control tick, the network included. Ticks count from 0. A state that is not finite gives IMPROMPTU_STATUS_NOT_FINITE and
+/// no command: what the motors then do is the caller's decision. Needs up to 4 KB of stack.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_flight_step(
     flight: *mut FlightMemory,
@@ -90,9 +90,9 @@ pub unsafe extern "C" fn impromptu_flight_step(
     })
 }
 
-/// One control tick without the network: the same commands as impromptu_flight_step, if each inference is delivered before the next
-/// reference tick. Sets `due` to 1 and writes `job` if the network is to be evaluated (impromptu_job_run), else sets it to 0.
-/// Needs up to 4 KB of stack.
+/// One control tick without the network: the same commands as impromptu_flight_step, if each inference is delivered before the
+/// next reference tick. Sets `due` to 1 and writes `job` if the network is to be evaluated (impromptu_job_run), else sets it to
+/// 0. Needs up to 4 KB of stack.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_flight_control(
     flight: *mut FlightMemory,

@@ -1,12 +1,13 @@
 //! The C face: the one place where pointers become values, and the source of `include/impromptu.h`.
 //!
-//! *in* pointers from C; *out* checked values for the safe modules; *never* a reference to the caller's numbers (they are copied in and out, so that
-//! buffers may overlap), nor an object that was not created in its memory; *source* the rules below, which the header tells the caller.
+//! *in* pointers from C; *out* checked values for the safe modules; *never* a reference to the caller's numbers (they are copied
+//! in and out, so that buffers may overlap), nor an object that was not created in its memory; *source* the rules below, which
+//! the header tells the caller.
 //!
 //! # Safety
-//! What no check can find, the caller of every function promises: a pointer that is neither NULL nor misaligned points to as many values of
-//! its type as the function says; memory of an object is left alone, is not moved, and lives as long as what was created from it; no two
-//! calls use the same object at the same time, unless both only read it; texts end with a zero byte.
+//! What no check can find, the caller of every function promises: a pointer that is neither NULL nor misaligned points to as many
+//! values of its type as the function says; memory of an object is left alone, is not moved, and lives as long as what was
+//! created from it; no two calls use the same object at the same time, unless both only read it; texts end with a zero byte.
 #![allow(unsafe_code)]
 // Said once, above.
 #![allow(clippy::missing_safety_doc)]
@@ -50,7 +51,8 @@ fn checked<T>(pointer: *const T) -> Result<*const T, Status> {
     }
 }
 
-/// Creates an object in memory of `size` bytes, in place: it may be larger than a task's stack. If it cannot be made the memory holds none.
+/// Creates an object in memory of `size` bytes, in place: it may be larger than a task's stack. If it cannot be made the memory
+/// holds none.
 unsafe fn create<T: Stored>(memory: *mut T::Memory, size: usize, make: impl FnOnce(*mut T) -> Result<(), Status>) -> Status {
     let () = T::FITS;
     report(|| {
@@ -72,7 +74,8 @@ unsafe fn create<T: Stored>(memory: *mut T::Memory, size: usize, make: impl FnOn
 unsafe fn object<'a, T: Stored>(memory: *mut T::Memory) -> Result<&'a mut T, Status> {
     let () = T::FITS;
     let object = checked(memory)?.cast::<Object<T>>().cast_mut();
-    // SAFETY: the memory has the object's size; the value is read only if the mark says that it was written. No other call uses it.
+    // SAFETY: the memory has the object's size; the value is read only if the mark says that it was written. No other call uses
+    // it.
     unsafe {
         match ptr::addr_of!((*object).mark).read() == T::MARK {
             true => Ok(&mut (*object).value),

@@ -20,8 +20,9 @@ pub extern "C" fn impromptu_status_text(status: i32) -> *const c_char {
 
 /// Checks a model file of `length` bytes and creates the model in `model`, which has `size` bytes (sizeof *model).
 ///
-/// The bytes stay where they are, in flash for instance: they must live and keep unchanged as long as the model. They should start at a multiple of
-/// 16 bytes; elsewhere they are read by slower kernels, with the same results. Needs up to 4 KB of stack on a microcontroller; what is not said to need more, 2 KB.
+/// The bytes stay where they are, in flash for instance: they must live and keep unchanged as long as the model. They should
+/// start at a multiple of 16 bytes; elsewhere they are read by slower kernels, with the same results. Needs up to 4 KB of stack
+/// on a microcontroller; what is not said to need more, 2 KB.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_model_create(model: *mut ModelMemory, size: usize, bytes: *const u8, length: usize) -> Status {
     let bytes = match checked(bytes) {
@@ -53,8 +54,8 @@ pub unsafe extern "C" fn impromptu_model_describe(model: *const ModelMemory, des
     })
 }
 
-/// Creates the working memory of an evaluation in `scratch`, which has `size` bytes. One is enough for everything that never runs at the
-/// same time.
+/// Creates the working memory of an evaluation in `scratch`, which has `size` bytes. One is enough for everything that never runs
+/// at the same time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_scratch_create(scratch: *mut ScratchMemory, size: usize) -> Status {
     // SAFETY: the module's rules.
@@ -66,8 +67,8 @@ pub unsafe extern "C" fn impromptu_scratch_create(scratch: *mut ScratchMemory, s
     }
 }
 
-/// Evaluates the network: the work of a task of lower priority. It touches nothing but its arguments, so that an adapter or flight stack may go
-/// on at the same time.
+/// Evaluates the network: the work of a task of lower priority. It touches nothing but its arguments, so that an adapter or
+/// flight stack may go on at the same time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_job_run(
     job: *const Job,
@@ -87,7 +88,8 @@ pub unsafe extern "C" fn impromptu_job_run(
     })
 }
 
-/// Bytes of an object as the library was compiled: at most the sizeof of its type in the header. For checks in tests and start-up code.
+/// Bytes of an object as the library was compiled: at most the sizeof of its type in the header. For checks in tests and start-up
+/// code.
 #[unsafe(no_mangle)]
 pub extern "C" fn impromptu_model_size() -> usize {
     size_of::<Object<Model<'static>>>()

@@ -15,7 +15,7 @@ use crate::{
 const TICK: u32 = 1;
 const SETPOINT: u32 = 2;
 const LANES: u32 = 3;
-const EXCITATION: u32 = 4;
+const DITHER: u32 = 4;
 const END: u32 = 5;
 
 /// One call of the flight stack.
@@ -28,7 +28,7 @@ pub enum Event {
     /// The adapter's lanes are switched.
     Lanes(Lanes),
     /// [`Flight::excite`], m, world ENU.
-    Excitation(Vector3<f32>),
+    Dither(Vector3<f32>),
     /// The flight ends.
     End {
         /// Ticks recorded.
@@ -53,7 +53,7 @@ impl Event {
                 record(SETPOINT, [p.x, p.y, p.z, v.x, v.y, v.z, a.x, a.y, a.z, *yaw].map(f32::to_bits))
             }
             Self::Lanes(lanes) => record(LANES, [u32::from(lanes.network) | (u32::from(lanes.feedback) << 1)]),
-            Self::Excitation(offset) => record(EXCITATION, [offset.x, offset.y, offset.z].map(f32::to_bits)),
+            Self::Dither(offset) => record(DITHER, [offset.x, offset.y, offset.z].map(f32::to_bits)),
             Self::End { ticks } => record(END, [*ticks]),
         }
     }
@@ -71,7 +71,7 @@ impl Event {
         let event = match kind {
             LANES => return Ok(Self::Lanes(Lanes { network: values[0] & 1 != 0, feedback: values[0] & 2 != 0 })),
             END => return Ok(Self::End { ticks: values[0] }),
-            TICK | SETPOINT | EXCITATION => values.map(f32::from_bits),
+            TICK | SETPOINT | DITHER => values.map(f32::from_bits),
             found => return Err(RecordingError::Kind { found }),
         };
         if !event.iter().all(|value| value.is_finite()) {
@@ -91,7 +91,7 @@ impl Event {
             SETPOINT => {
                 Self::Setpoint(Setpoint { position: first, velocity: second, acceleration: Vector3::new(g, h, i), yaw: j })
             }
-            _ => Self::Excitation(first),
+            _ => Self::Dither(first),
         })
     }
 
@@ -99,7 +99,7 @@ impl Event {
     pub fn prepare(&self, flight: &mut Flight<'_>) {
         match self {
             Self::Setpoint(setpoint) => flight.push_setpoint(setpoint),
-            Self::Excitation(offset) => flight.excite(*offset),
+            Self::Dither(offset) => flight.set_dither(*offset),
             Self::Lanes(lanes) => {
                 if let Some(adapter) = flight.adapter() {
                     adapter.switch(*lanes);
@@ -126,7 +126,7 @@ mod tests {
     proptest! {
         #[test]
         fn records_keep_every_bit_or_are_refused(kind in 0u32..7, mut words in any::<[u32; 14]>()) {
-            let used = match kind { TICK => 14, SETPOINT => 10, EXCITATION => 3, _ => 1 };
+            let used = match kind { TICK => 14, SETPOINT => 10, DITHER => 3, _ => 1 };
             words[used..].fill(0);
             if kind == LANES {
                 words[0] &= 3;

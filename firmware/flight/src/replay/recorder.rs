@@ -53,9 +53,9 @@ impl<S: Default + Extend<u8>> Recorder<S> {
         self.write(Event::Lanes(lanes));
     }
 
-    /// The excitation was set.
-    pub fn excitation(&mut self, offset: Vector3<f32>) {
-        self.write(Event::Excitation(offset));
+    /// The dither was set.
+    pub fn dither(&mut self, offset: Vector3<f32>) {
+        self.write(Event::Dither(offset));
     }
 
     /// A control tick was flown: state in, motors and reference out.

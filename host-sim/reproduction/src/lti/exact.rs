@@ -32,7 +32,7 @@ pub(super) fn add(study: &mut Study) {
         let set = FeatureSet::transfer_function(model.order(), model.relative_degree());
         let count = set.features.len() as f64;
         study.find(finding(&system, "transfer_function_features", &[12], "transfer-function features, 2n - r + 1", count, ""));
-        debug_assert_eq!(set.features.len(), 2 * transfer.order() - transfer.relative_degree() + 1);
+        debug_assert_eq!(set.features.len(), 2 * transfer.order() - transfer.dead_time + 1);
         for (label, errors) in [("f64", wide), ("f32", narrow)] {
             curves.push(panel::curve(&format!("{}, {label}", system.title), errors.into_iter().map(f64::abs)));
         }

@@ -21,7 +21,7 @@ fn quick() -> Settings {
 fn the_papers_rows_on_linear_systems_come_out_as_it_states_them() {
     let study = &*QUICK;
     let value = |name: &str| study.value(name).unwrap_or_else(|| panic!("no number {name}"));
-    assert_eq!(unanswered(&study, super::ROWS), Vec::<u8>::new());
+    assert_eq!(unanswered(study, super::ROWS), Vec::<u8>::new());
     assert!(value("s1_state_space_tracking_rms_f64") < 1e-5 && value("s1_state_space_tracking_rms_int8") < 0.05);
     // S2: lost, although the module is learned.
     assert!(value("s2_state_space_tracking_rms_f64") > 1.0 && value("s2_exact_state_space_law_lost_f32") < 6_500.0);

@@ -1,8 +1,8 @@
 //! From logs to a model file, for any list of inputs and any reference point.
 //!
-//! *in* a recipe, logs of the baseline; *out* a network and its ridge regression, and model files of them; *never* another feature function,
-//! kernel or adapter than the firmware's; *source* Zhou 2017, section III-A and Insight 3. What is trained does not depend on whether y_d or y
-//! is the reference point: in the training data they are the same. Only in flight they differ.
+//! *in* a recipe, logs of the baseline; *out* a network and its ridge regression, and model files of them; *never* another
+//! feature function, kernel or adapter than the firmware's; *source* Zhou 2017, section III-A and Insight 3. What is trained does
+//! not depend on whether y_d or y is the reference point: in the training data they are the same. Only in flight they differ.
 
 use impromptu_firmware::{
     adapter::Lanes,
@@ -38,9 +38,9 @@ pub struct Learned {
 ///
 /// # Errors
 /// If the logs hold too little.
-pub fn learn(recipe: &Recipe, plant: &Loop, logs: &[FlightLog], labels: Labels) -> anyhow::Result<Learned> {
+pub fn learn(recipe: &Recipe, closed_loop: &Loop, logs: &[FlightLog], labels: Labels) -> anyhow::Result<Learned> {
     let one = Recipe { weight_decays: vec![recipe.network.weight_decay], shares: vec![1.0], ..recipe.clone() };
-    let pipeline = Pipeline::unjudged(&one, plant, recipe.network.seed);
+    let pipeline = Pipeline::unjudged(&one, closed_loop, recipe.network.seed);
     let settings = LearnSettings { labels, precision: Precision::Float, broken: true, ..pipeline.settings };
     let maps = Pipeline { settings, ..pipeline }.learn(logs, &mut |_| {})?;
     Ok(Learned { recipe: recipe.clone(), maps })
@@ -51,8 +51,14 @@ impl Learned {
     ///
     /// # Errors
     /// If it cannot be encoded.
-    pub fn file(&self, plant: &Loop, network: &FloatNetwork, inputs: &[Feature], base: Origin) -> Result<Vec<u8>, ExportError> {
-        let mut description = describe(&self.recipe, plant, &self.maps.rows, None, "study", "", self.recipe.network.seed);
+    pub fn file(
+        &self,
+        closed_loop: &Loop,
+        network: &FloatNetwork,
+        inputs: &[Feature],
+        base: Origin,
+    ) -> Result<Vec<u8>, ExportError> {
+        let mut description = describe(&self.recipe, closed_loop, &self.maps.rows, None, "study", "", self.recipe.network.seed);
         description.features = inputs.to_vec();
         for output in &mut description.outputs {
             (output.limit, output.slew) = (LIMIT, 2.0 * LIMIT);
@@ -75,25 +81,25 @@ impl Learned {
     ///
     /// # Errors
     /// If it cannot be encoded.
-    pub fn network_file(&self, plant: &Loop) -> Result<Vec<u8>, ExportError> {
-        self.file(plant, &self.maps.network, &self.recipe.features(), Origin::Desired)
+    pub fn network_file(&self, closed_loop: &Loop) -> Result<Vec<u8>, ExportError> {
+        self.file(closed_loop, &self.maps.network, &self.recipe.features(), Origin::Desired)
     }
 
     /// p_r = p_d + a_d / kp, without anything learned, for the same loop.
     ///
     /// # Errors
     /// If it cannot be encoded.
-    pub fn feedforward_file(&self, plant: &Loop) -> Result<Vec<u8>, ExportError> {
-        let description = describe(&self.recipe, plant, &self.maps.rows, None, "feedforward", "", self.recipe.network.seed);
-        feedforward(&plant.settings, description)
+    pub fn feedforward_file(&self, closed_loop: &Loop) -> Result<Vec<u8>, ExportError> {
+        let description = describe(&self.recipe, closed_loop, &self.maps.rows, None, "feedforward", "", self.recipe.network.seed);
+        feedforward(&closed_loop.settings, description)
     }
 
     /// The ridge regression's.
     ///
     /// # Errors
     /// If it cannot be encoded.
-    pub fn ridge_file(&self, plant: &Loop) -> Result<Vec<u8>, ExportError> {
-        self.file(plant, &self.maps.ridge, &self.recipe.features(), Origin::Desired)
+    pub fn ridge_file(&self, closed_loop: &Loop) -> Result<Vec<u8>, ExportError> {
+        self.file(closed_loop, &self.maps.ridge, &self.recipe.features(), Origin::Desired)
     }
 }
 
@@ -113,8 +119,8 @@ impl Course {
     ///
     /// # Errors
     /// If it cannot be flown.
-    pub fn new(plant: &Loop, trajectories: Vec<Trajectory>, seed: u64) -> anyhow::Result<Self> {
-        let baseline = plant.errors(&trajectories, None, 1.0, seed)?;
+    pub fn new(closed_loop: &Loop, trajectories: Vec<Trajectory>, seed: u64) -> anyhow::Result<Self> {
+        let baseline = closed_loop.errors(&trajectories, None, 1.0, seed)?;
         Ok(Self { trajectories, seed, baseline })
     }
 
@@ -122,9 +128,9 @@ impl Course {
     ///
     /// # Errors
     /// If the file is refused.
-    pub fn errors(&self, plant: &Loop, file: &[u8], lanes: Lanes) -> anyhow::Result<Vec<f64>> {
+    pub fn errors(&self, closed_loop: &Loop, file: &[u8], lanes: Lanes) -> anyhow::Result<Vec<f64>> {
         let model = Model::from_bytes(file).map_err(ExportError::Refused)?;
-        Ok(plant.unguarded().errors(&self.trajectories, Some((&model, lanes)), 1.0, self.seed)?)
+        Ok(closed_loop.unguarded().errors(&self.trajectories, Some((&model, lanes)), 1.0, self.seed)?)
     }
 
     /// Reduction of each flight, per cent.
@@ -136,15 +142,15 @@ impl Course {
     ///
     /// # Errors
     /// If the file is refused.
-    pub fn reduction(&self, plant: &Loop, file: &[u8]) -> anyhow::Result<(f64, f64)> {
-        Ok(reduction(&self.baseline, &self.errors(plant, file, NETWORK)?))
+    pub fn reduction(&self, closed_loop: &Loop, file: &[u8]) -> anyhow::Result<(f64, f64)> {
+        Ok(reduction(&self.baseline, &self.errors(closed_loop, file, NETWORK)?))
     }
 
     /// Logs of the flights with a model file, or of the baseline.
     ///
     /// # Errors
     /// If the file is refused.
-    pub fn logs(&self, plant: &Loop, file: Option<&[u8]>) -> anyhow::Result<Vec<FlightLog>> {
+    pub fn logs(&self, closed_loop: &Loop, file: Option<&[u8]>) -> anyhow::Result<Vec<FlightLog>> {
         let model = file.map(Model::from_bytes).transpose().map_err(ExportError::Refused)?;
         let plans: Vec<FlightPlan<'_>> = self
             .trajectories
@@ -152,11 +158,11 @@ impl Course {
             .zip(self.seed..)
             .map(|(trajectory, seed)| FlightPlan {
                 model: model.as_ref().map(|model| (model, NETWORK)),
-                guard: plant.unguarded().guard,
+                guard: closed_loop.unguarded().guard,
                 log: true,
                 ..FlightPlan::new(trajectory, seed)
             })
             .collect();
-        Ok(plant.fly(&plans)?.into_iter().filter_map(|record| record.log).collect())
+        Ok(closed_loop.fly(&plans)?.into_iter().filter_map(|record| record.log).collect())
     }
 }

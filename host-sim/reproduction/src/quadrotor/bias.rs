@@ -15,7 +15,7 @@ use impromptu_report::{
 use impromptu_sim::{
     flight_log::FlightLog,
     rollout::{FlightPlan, fly_on},
-    trajectory::{Sample, Trajectory},
+    trajectory::{Sample, Trajectory, tones::smooth_step},
 };
 use impromptu_training::{Labels, Purpose, derived};
 use rayon::prelude::*;
@@ -40,29 +40,26 @@ fn step_to(height: f64, rate_hz: f64) -> Trajectory {
     let lead = rate_hz.round() as usize;
     let count = (SETTLED * rate_hz) as usize;
     let at = |index: usize| {
-        let s = ((index as f64 - lead as f64) / rate_hz / STEP).clamp(0.0, 1.0);
-        let rise = s * s * s * (10.0 - s * (15.0 - 6.0 * s));
-        let speed = 30.0 * s * s * (1.0 - s) * (1.0 - s) / STEP;
-        let bend = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (STEP * STEP);
+        let [rise, speed, bend] = smooth_step((index as f64 - lead as f64) / rate_hz / STEP);
         let along = |value: f64| [0.0, 0.0, height * value];
-        Sample { position: along(rise), velocity: along(speed), acceleration: along(bend), yaw: 0.0 }
+        Sample { position: along(rise), velocity: along(speed / STEP), acceleration: along(bend / (STEP * STEP)), yaw: 0.0 }
     };
     Trajectory { name: format!("step to {height} m"), rate_hz, samples: (0..count).map(at).collect(), scored: lead..count }
 }
 
 /// Flies with halved heights, all at once.
 fn fly(ground: &Ground<'_>, trajectories: &[Trajectory], file: Option<&[u8]>) -> anyhow::Result<Vec<FlightLog>> {
-    let plant = &ground.plant;
+    let closed_loop = &ground.closed_loop;
     let model = file.map(Model::from_bytes).transpose().map_err(ExportError::Refused)?;
-    let delay = plant.condition.command_delay_ticks(plant.settings.rates.control_hz.into());
+    let delay = closed_loop.condition.command_delay_ticks(closed_loop.settings.rates.control_hz.into());
     trajectories
         .par_iter()
         .enumerate()
         .map(|(seed, trajectory)| {
-            let stack = HalfHeight::new(&plant.settings, delay, model.as_ref())?
+            let stack = HalfHeight::new(&closed_loop.settings, delay, model.as_ref())?
                 .ok_or_else(|| anyhow::anyhow!("the predecessor's airframe cannot be mixed"))?;
             let plan = FlightPlan { log: true, ..FlightPlan::new(trajectory, seed as u64) };
-            let record = fly_on(stack, &plant.vehicle, &plant.settings, &plant.condition, &plan)?;
+            let record = fly_on(stack, &closed_loop.vehicle, &closed_loop.settings, &closed_loop.condition, &plan)?;
             record.log.ok_or_else(|| anyhow::anyhow!("no log"))
         })
         .collect()
@@ -93,7 +90,7 @@ type Flown = (String, String, Vec<FlightLog>);
 
 /// Trains both and flies the steps.
 pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> {
-    let rate = ground.plant.rate_hz();
+    let rate = ground.closed_loop.rate_hz();
     let steps: Vec<Trajectory> = HEIGHTS.iter().map(|height| step_to(*height, rate)).collect();
     let seed = derived(ground.settings.seed, Purpose::Training);
     let motions = multisine(ground.settings.flights.min(4)).motions(seed);
@@ -107,9 +104,9 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> 
     let learned: Vec<Vec<Flown>> = lists()
         .into_par_iter()
         .map(|(name, words, list)| {
-            let learned = learn(&ground.recipe(list), &ground.plant, &logs, Labels::Corrections)?;
-            let network = fly(ground, &steps, Some(&learned.network_file(&ground.plant)?))?;
-            let ridge = fly(ground, &steps, Some(&learned.ridge_file(&ground.plant)?))?;
+            let learned = learn(&ground.recipe(list), &ground.closed_loop, &logs, Labels::Corrections)?;
+            let network = fly(ground, &steps, Some(&learned.network_file(&ground.closed_loop)?))?;
+            let ridge = fly(ground, &steps, Some(&learned.ridge_file(&ground.closed_loop)?))?;
             Ok(vec![(name.to_owned(), words.to_owned(), network), (format!("{name}_ridge"), format!("{words}, ridge"), ridge)])
         })
         .collect::<anyhow::Result<_>>()?;

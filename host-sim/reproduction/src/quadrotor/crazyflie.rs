@@ -10,7 +10,7 @@ use impromptu_sim::{
     plant::Vehicle,
     trajectory::{STROKE_ACCELERATION, STROKE_SPEED, strokes},
 };
-use impromptu_training::{Excitation, Purpose, Recipe, Signal, derived, supervised::TrainingSettings};
+use impromptu_training::{FlightSet, Purpose, Recipe, Signal, derived, supervised::TrainingSettings};
 
 use super::{addon::Course, settings::QuadrotorSettings};
 
@@ -34,8 +34,8 @@ pub(super) struct Crazyflie {
 }
 
 /// Training strokes at some speeds.
-pub(super) fn excitations(speeds: &[f64], flights: u32) -> Vec<Excitation> {
-    let of = |speed: &f64| Excitation {
+pub(super) fn training_flights(speeds: &[f64], flights: u32) -> Vec<FlightSet> {
+    let of = |speed: &f64| FlightSet {
         signal: Signal::Strokes,
         flights,
         seconds: 0.0,
@@ -59,17 +59,19 @@ impl Crazyflie {
         let lab = Loop::new(vehicle, "stock", condition("lab")?)?.unguarded();
         let brushless = Loop::new(Vehicle::named("crazyflie-brushless")?, "stock", condition("clean")?)?.unguarded();
         let first = derived(settings.seed, Purpose::Training);
-        let excitations = excitations(&[1.0, 2.0], settings.crazyflie_flights / 2);
-        let collect = |plant: &Loop| -> anyhow::Result<Vec<FlightLog>> {
+        let training_flights = training_flights(&[1.0, 2.0], settings.crazyflie_flights / 2);
+        let collect = |closed_loop: &Loop| -> anyhow::Result<Vec<FlightLog>> {
             let mut logs = Vec::new();
-            for (kind, excitation) in excitations.iter().enumerate() {
+            for (kind, flight_set) in training_flights.iter().enumerate() {
                 let seed = first.wrapping_add(10_000 * kind as u64);
-                logs.extend(plant.collect(&excitation.motions(seed), None, seed)?);
+                logs.extend(closed_loop.collect(&flight_set.motions(seed), None, seed)?);
             }
             Ok(logs)
         };
         let seed = derived(settings.seed, Purpose::Validation);
-        let course = |plant: &Loop, speed| Course::new(plant, strokes(seed, settings.validation, speed, plant.rate_hz())?, seed);
+        let course = |closed_loop: &Loop, speed| {
+            Course::new(closed_loop, strokes(seed, settings.validation, speed, closed_loop.rate_hz())?, seed)
+        };
         Ok(Self {
             clean_logs: collect(&clean)?,
             lab_logs: collect(&lab)?,
@@ -83,7 +85,7 @@ impl Crazyflie {
             recipe: Recipe {
                 interpolation: Interpolation::Linear,
                 stride: 10,
-                excitations: excitations.clone(),
+                training_flights: training_flights.clone(),
                 network: TrainingSettings {
                     epochs: settings.epochs / 3,
                     weight_decay: 0.1,

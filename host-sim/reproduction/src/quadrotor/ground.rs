@@ -8,7 +8,7 @@ use impromptu_sim::{
     trajectory::{STROKE_SPEED, by_name, stroke},
 };
 use impromptu_training::{
-    Excitation, Purpose, Recipe, Signal, derived,
+    FlightSet, Purpose, Recipe, Signal, derived,
     supervised::{Skip, TrainingSettings},
 };
 
@@ -21,7 +21,7 @@ use super::{
 /// What the sections share: the predecessor's loop, what it is trained on and flown over.
 pub(super) struct Ground<'a> {
     pub(super) settings: &'a QuadrotorSettings,
-    pub(super) plant: Loop,
+    pub(super) closed_loop: Loop,
     pub(super) logs: Vec<FlightLog>,
     pub(super) validation: Course,
     pub(super) test: Course,
@@ -32,8 +32,8 @@ pub(super) const TEST: [&str; 5] = ["letters:DSL", "figure8", "star", "trefoil",
 
 impl<'a> Ground<'a> {
     pub(super) fn new(settings: &'a QuadrotorSettings) -> anyhow::Result<Self> {
-        let plant = predecessor()?;
-        let rate = plant.rate_hz();
+        let closed_loop = predecessor()?;
+        let rate = closed_loop.rate_hz();
         let seed = derived(settings.seed, Purpose::Validation);
         let validation: Vec<_> = (0..settings.validation as u64)
             .map(|index| stroke(seed, index).scaled(SPEED / STROKE_SPEED).sampled(rate))
@@ -41,10 +41,10 @@ impl<'a> Ground<'a> {
         let test: Vec<_> = TEST.iter().map(|name| Ok(at_its_pace(by_name(name)?, rate)?)).collect::<anyhow::Result<_>>()?;
         let first = derived(settings.seed, Purpose::Training);
         Ok(Self {
-            logs: plant.collect(&multisine(settings.flights).motions(first), None, first)?,
-            validation: Course::new(&plant, validation, seed)?,
-            test: Course::new(&plant, test, derived(settings.seed, Purpose::Test))?,
-            plant,
+            logs: closed_loop.collect(&multisine(settings.flights).motions(first), None, first)?,
+            validation: Course::new(&closed_loop, validation, seed)?,
+            test: Course::new(&closed_loop, test, derived(settings.seed, Purpose::Test))?,
+            closed_loop,
             settings,
         })
     }
@@ -74,6 +74,6 @@ impl<'a> Ground<'a> {
 }
 
 /// Twelve tones an axis. The loop is slow: it flies less than it is asked for.
-pub(super) fn multisine(flights: u32) -> Excitation {
-    Excitation { signal: Signal::Multisine, flights, seconds: 100.0, max_speed: 2.0, max_acceleration: 4.0, shortest_s: 1.5 }
+pub(super) fn multisine(flights: u32) -> FlightSet {
+    FlightSet { signal: Signal::Multisine, flights, seconds: 100.0, max_speed: 2.0, max_acceleration: 4.0, shortest_s: 1.5 }
 }

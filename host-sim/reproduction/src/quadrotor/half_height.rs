@@ -3,8 +3,8 @@
 //! *in* and *out* those of the firmware's flight stack, which flies inside; *never* another loop than the firmware's; *source* Zhou 2017, Fig. 4.
 
 use impromptu_firmware::{
+    AddOn,
     adapter::Lanes,
-    add_on::AddOn,
     guard::{GuardSettings, Trips},
     model::{Model, Refusal},
     network::Scratch,
@@ -64,7 +64,7 @@ impl FlightStack for HalfHeight<'_> {
         self.add_on.next_tick()
     }
 
-    fn excite(&mut self, _: Vector3<f32>) {}
+    fn set_dither(&mut self, _: Vector3<f32>) {}
 
     fn step(&mut self, tick: Tick, state: &State) -> MotorCommand {
         if tick.0.is_multiple_of(self.divisor) {

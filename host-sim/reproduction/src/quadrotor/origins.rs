@@ -17,7 +17,7 @@ const SECTION: &str = "Difference learning and its reference point";
 
 /// Flies the four choices, and trains without differences.
 pub(super) fn run(ground: &Ground<'_>, twelve_inputs: &Learned, study: &mut Study) -> anyhow::Result<()> {
-    let plant = &ground.plant;
+    let closed_loop = &ground.closed_loop;
     let choices: Vec<(Origin, Origin)> = [Origin::Desired, Origin::Measured]
         .into_iter()
         .flat_map(|inputs| [(inputs, Origin::Desired), (inputs, Origin::Measured)])
@@ -26,13 +26,13 @@ pub(super) fn run(ground: &Ground<'_>, twelve_inputs: &Learned, study: &mut Stud
         .par_iter()
         .map(|&(inputs, base)| {
             let list = twelve(inputs);
-            let network = twelve_inputs.file(plant, &twelve_inputs.maps.network, &list, base)?;
-            let ridge = twelve_inputs.file(plant, &twelve_inputs.maps.ridge, &list, base)?;
+            let network = twelve_inputs.file(closed_loop, &twelve_inputs.maps.network, &list, base)?;
+            let ridge = twelve_inputs.file(closed_loop, &twelve_inputs.maps.ridge, &list, base)?;
             Ok([
-                ground.test.reduction(plant, &network)?,
-                ground.validation.reduction(plant, &network)?,
-                ground.test.reduction(plant, &ridge)?,
-                ground.validation.reduction(plant, &ridge)?,
+                ground.test.reduction(closed_loop, &network)?,
+                ground.validation.reduction(closed_loop, &network)?,
+                ground.test.reduction(closed_loop, &ridge)?,
+                ground.validation.reduction(closed_loop, &ridge)?,
             ])
         })
         .collect::<anyhow::Result<_>>()?;
@@ -48,10 +48,10 @@ pub(super) fn run(ground: &Ground<'_>, twelve_inputs: &Learned, study: &mut Stud
             );
         }
     }
-    let whole = learn(&ground.recipe(twelve(Origin::Nothing)), plant, &ground.logs, Labels::References)?;
+    let whole = learn(&ground.recipe(twelve(Origin::Nothing)), closed_loop, &ground.logs, Labels::References)?;
     for (map, network) in [("network", &whole.maps.network), ("ridge", &whole.maps.ridge)] {
-        let file = whole.file(plant, network, &twelve(Origin::Nothing), Origin::Nothing)?;
-        let (test, validation) = (ground.test.reduction(plant, &file)?, ground.validation.reduction(plant, &file)?);
+        let file = whole.file(closed_loop, network, &twelve(Origin::Nothing), Origin::Nothing)?;
+        let (test, validation) = (ground.test.reduction(closed_loop, &file)?, ground.validation.reduction(closed_loop, &file)?);
         report(
             study,
             &format!("no_difference_{map}"),

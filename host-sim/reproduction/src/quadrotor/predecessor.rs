@@ -33,10 +33,10 @@ pub fn predecessor() -> anyhow::Result<Loop> {
         noise: SensorNoise::default(),
         weather: WeatherSettings::default(),
     };
-    let mut plant = Loop::new(Vehicle::from_toml(include_str!("predecessor.toml"))?, "stock", condition)?;
-    plant.settings.rates = Rates { control_hz: 400.0, position_divisor: 6 };
-    plant.guard = GuardSettings::OFF;
-    Ok(plant)
+    let mut closed_loop = Loop::new(Vehicle::from_toml(include_str!("predecessor.toml"))?, "stock", condition)?;
+    closed_loop.settings.rates = Rates { control_hz: 400.0, position_divisor: 6 };
+    closed_loop.guard = GuardSettings::OFF;
+    Ok(closed_loop)
 }
 
 /// A motion at the predecessor's pace.
@@ -55,8 +55,8 @@ mod tests {
 
     #[test]
     fn a_tick_of_the_add_on_lasts_150_ms_and_the_link_100_ms() {
-        let plant = predecessor().unwrap();
-        assert!((f64::from(DIVISOR) / plant.rate_hz() - 0.15).abs() < 1e-6);
-        assert_eq!(plant.condition.command_delay_ticks(plant.settings.rates.control_hz.into()), 40);
+        let closed_loop = predecessor().unwrap();
+        assert!((f64::from(DIVISOR) / closed_loop.rate_hz() - 0.15).abs() < 1e-6);
+        assert_eq!(closed_loop.condition.command_delay_ticks(closed_loop.settings.rates.control_hz.into()), 40);
     }
 }

@@ -56,15 +56,15 @@ pub(super) fn run(ground: &Ground<'_>, crazyflie: &Crazyflie, study: &mut Study)
 }
 
 fn sub_rates(crazyflie: &Crazyflie, study: &mut Study) -> anyhow::Result<()> {
-    let plant = &crazyflie.clean;
+    let closed_loop = &crazyflie.clean;
     let found: Vec<[(f64, f64); 2]> = DIVISORS
         .par_iter()
         .map(|&divisor| {
             let recipe = windowed(&crazyflie.recipe, divisor, WINDOW[1]);
-            let learned = learn(&recipe, plant, &crazyflie.clean_logs, Labels::Corrections)?;
+            let learned = learn(&recipe, closed_loop, &crazyflie.clean_logs, Labels::Corrections)?;
             let fly = |interpolation| {
-                let file = learned.at(interpolation).network_file(plant)?;
-                crazyflie.clean_course.reduction(plant, &file)
+                let file = learned.at(interpolation).network_file(closed_loop)?;
+                crazyflie.clean_course.reduction(closed_loop, &file)
             };
             Ok([fly(Interpolation::Hold)?, fly(Interpolation::Linear)?])
         })
@@ -96,10 +96,10 @@ fn previews(crazyflie: &Crazyflie, study: &mut Study) -> anyhow::Result<()> {
     let found: Vec<[(f64, f64); 2]> = PREVIEWS
         .par_iter()
         .map(|&preview| {
-            let fly = |plant, logs, course: &super::addon::Course| {
+            let fly = |closed_loop, logs, course: &super::addon::Course| {
                 let recipe = windowed(&crazyflie.recipe, 10, preview);
-                let learned = learn(&Recipe { network: crazyflie.linear(), ..recipe }, plant, logs, Labels::Corrections)?;
-                course.reduction(plant, &learned.ridge_file(plant)?)
+                let learned = learn(&Recipe { network: crazyflie.linear(), ..recipe }, closed_loop, logs, Labels::Corrections)?;
+                course.reduction(closed_loop, &learned.ridge_file(closed_loop)?)
             };
             Ok([
                 fly(&crazyflie.clean, &crazyflie.clean_logs, &crazyflie.clean_course)?,
@@ -131,12 +131,12 @@ fn previews(crazyflie: &Crazyflie, study: &mut Study) -> anyhow::Result<()> {
 
 /// The predecessor's loop with 12 inputs: r as a number of ticks against r as a time, by sub-rate; and r itself.
 fn steps_and_seconds(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> {
-    let plant = &ground.plant;
+    let closed_loop = &ground.closed_loop;
     let fly = |divisor: u16, degrees: [i16; 3]| {
         let recipe = Recipe { divisor, ..ground.recipe(with_degrees(degrees, Origin::Measured)) };
         let recipe = Recipe { network: super::crazyflie::linear(&recipe.network), ..recipe };
-        let learned = learn(&recipe, plant, &ground.logs, Labels::Corrections)?;
-        Ok::<_, anyhow::Error>(ground.validation.reduction(plant, &learned.ridge_file(plant)?)?.0.max(-1e6))
+        let learned = learn(&recipe, closed_loop, &ground.logs, Labels::Corrections)?;
+        Ok::<_, anyhow::Error>(ground.validation.reduction(closed_loop, &learned.ridge_file(closed_loop)?)?.0.max(-1e6))
     };
     let found: Vec<[f64; 2]> = TICKS
         .par_iter()
@@ -146,7 +146,7 @@ fn steps_and_seconds(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<(
             Ok([fly(ticks, [4, 4, 2])?, fly(ticks, seconds)?])
         })
         .collect::<anyhow::Result<_>>()?;
-    let rates: Vec<f64> = TICKS.iter().map(|ticks| plant.rate_hz() / f64::from(*ticks)).collect();
+    let rates: Vec<f64> = TICKS.iter().map(|ticks| closed_loop.rate_hz() / f64::from(*ticks)).collect();
     let kinds = [(0, "steps", "r = 4, 4, 2 ticks"), (1, "seconds", "r = 0.6, 0.6, 0.3 s")];
     for (way, kind, words) in kinds {
         for (rate, found) in rates.iter().zip(&found) {

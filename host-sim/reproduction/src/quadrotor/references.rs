@@ -16,10 +16,10 @@ use super::addon::Course;
 const LONGEST_S: f64 = 2.0;
 
 /// Flies the baseline over `references`; errors are taken against `desired`, sample by sample.
-fn fly(plant: &Loop, references: &[Trajectory], seed: u64) -> anyhow::Result<Vec<FlightLog>> {
-    let plan = |(trajectory, seed)| FlightPlan { log: true, guard: plant.guard, ..FlightPlan::new(trajectory, seed) };
+fn fly(closed_loop: &Loop, references: &[Trajectory], seed: u64) -> anyhow::Result<Vec<FlightLog>> {
+    let plan = |(trajectory, seed)| FlightPlan { log: true, guard: closed_loop.guard, ..FlightPlan::new(trajectory, seed) };
     let plans: Vec<FlightPlan<'_>> = references.iter().zip(seed..).map(plan).collect();
-    Ok(plant.fly(&plans)?.into_iter().filter_map(|record| record.log).collect())
+    Ok(closed_loop.fly(&plans)?.into_iter().filter_map(|record| record.log).collect())
 }
 
 /// sqrt(mean |p_d - p|²) over the drawn part, m, with the true position.
@@ -42,16 +42,16 @@ fn padded(trajectory: &Trajectory, ticks: i64) -> Trajectory {
 ///
 /// # Errors
 /// If it cannot be flown.
-pub fn shifted(plant: &Loop, course: &Course, shift_s: f64) -> anyhow::Result<Vec<f64>> {
-    let pad = (LONGEST_S * plant.rate_hz()) as i64;
-    let shift = (shift_s * plant.rate_hz()).round() as i64;
+pub fn shifted(closed_loop: &Loop, course: &Course, shift_s: f64) -> anyhow::Result<Vec<f64>> {
+    let pad = (LONGEST_S * closed_loop.rate_hz()) as i64;
+    let shift = (shift_s * closed_loop.rate_hz()).round() as i64;
     let desired: Vec<Trajectory> = course.trajectories.iter().map(|trajectory| padded(trajectory, pad)).collect();
     let early = |trajectory: &Trajectory| {
         let samples = (0..trajectory.samples.len() as i64).map(|tick| trajectory.sample_at(tick + shift)).collect();
         Trajectory { samples, ..trajectory.clone() }
     };
     let references: Vec<Trajectory> = desired.iter().map(early).collect();
-    let logs = fly(plant, &references, course.seed)?;
+    let logs = fly(closed_loop, &references, course.seed)?;
     Ok(desired.iter().zip(&logs).map(|(desired, log)| error(desired, log)).collect())
 }
 
@@ -59,11 +59,11 @@ pub fn shifted(plant: &Loop, course: &Course, shift_s: f64) -> anyhow::Result<Ve
 ///
 /// # Errors
 /// If it cannot be flown.
-pub fn best_shift(plant: &Loop, course: &Course) -> anyhow::Result<f64> {
+pub fn best_shift(closed_loop: &Loop, course: &Course) -> anyhow::Result<f64> {
     let best = |candidates: Vec<f64>| -> anyhow::Result<f64> {
         let mut least = (f64::INFINITY, 0.0);
         for shift in candidates {
-            let sum: f64 = shifted(plant, course, shift)?.iter().sum();
+            let sum: f64 = shifted(closed_loop, course, shift)?.iter().sum();
             least = if sum < least.0 { (sum, shift) } else { least };
         }
         Ok(least.1)
@@ -94,32 +94,32 @@ impl IterativeLearning {
     ///
     /// # Errors
     /// If they cannot be flown.
-    pub fn fly(&self, plant: &Loop, course: &Course, trials: usize) -> anyhow::Result<Vec<Vec<f64>>> {
-        let pad = (LONGEST_S * plant.rate_hz()) as i64;
+    pub fn fly(&self, closed_loop: &Loop, course: &Course, trials: usize) -> anyhow::Result<Vec<Vec<f64>>> {
+        let pad = (LONGEST_S * closed_loop.rate_hz()) as i64;
         let desired: Vec<Trajectory> = course.trajectories.iter().map(|trajectory| padded(trajectory, pad)).collect();
         let mut references = desired.clone();
         let mut errors = Vec::new();
         for trial in 0..=trials {
             let seed = course.seed.wrapping_add(1_000 * trial as u64);
-            let logs = fly(plant, &references, seed)?;
+            let logs = fly(closed_loop, &references, seed)?;
             errors.push(desired.iter().zip(&logs).map(|(desired, log)| error(desired, log)).collect());
             if trial < trials {
                 references = desired
                     .iter()
                     .zip(&references)
                     .zip(&logs)
-                    .map(|((desired, used), log)| self.next(plant, desired, used, log))
+                    .map(|((desired, used), log)| self.next(closed_loop, desired, used, log))
                     .collect();
             }
         }
         Ok(errors)
     }
 
-    fn next(&self, plant: &Loop, desired: &Trajectory, used: &Trajectory, log: &FlightLog) -> Trajectory {
-        let rate = plant.rate_hz();
+    fn next(&self, closed_loop: &Loop, desired: &Trajectory, used: &Trajectory, log: &FlightLog) -> Trajectory {
+        let rate = closed_loop.rate_hz();
         let last = used.samples.len() as i64 - 1;
         // What is measured is late; the error looked up is that of the time of the measurement.
-        let late = (plant.condition.measurement_delay_s * rate).round() as i64;
+        let late = (closed_loop.condition.measurement_delay_s * rate).round() as i64;
         let ahead = (self.delay_s * rate).round() as i64;
         let mut axes: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::with_capacity(used.samples.len()));
         for tick in 0..=last {
@@ -168,17 +168,17 @@ mod tests {
 
     #[test]
     fn an_early_reference_beats_the_baseline_and_trials_beat_both() {
-        let plant = predecessor().unwrap();
+        let closed_loop = predecessor().unwrap();
         let strokes =
-            (0..3).map(|index| stroke(77, index).scaled(SPEED / STROKE_SPEED).sampled(plant.rate_hz()).unwrap()).collect();
-        let course = Course::new(&plant, strokes, 5).unwrap();
+            (0..3).map(|index| stroke(77, index).scaled(SPEED / STROKE_SPEED).sampled(closed_loop.rate_hz()).unwrap()).collect();
+        let course = Course::new(&closed_loop, strokes, 5).unwrap();
         let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
-        let none = shifted(&plant, &course, 0.0).unwrap();
+        let none = shifted(&closed_loop, &course, 0.0).unwrap();
         // The longer hover before the drawn part changes next to nothing.
         assert!((mean(&none) / mean(&course.baseline) - 1.0).abs() < 0.05);
-        let early = shifted(&plant, &course, 1.0).unwrap();
+        let early = shifted(&closed_loop, &course, 1.0).unwrap();
         let learning = IterativeLearning { gain: 0.5, smoothing_s: 0.1, delay_s: 1.0 };
-        let trials = learning.fly(&plant, &course, 6).unwrap();
+        let trials = learning.fly(&closed_loop, &course, 6).unwrap();
         assert!(mean(&early) < 0.6 * mean(&none), "{early:?} {none:?}");
         assert!(mean(&trials[6]) < mean(&early) && mean(&trials[6]) < mean(&trials[1]), "{trials:?}");
     }

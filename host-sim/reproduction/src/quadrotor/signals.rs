@@ -8,7 +8,7 @@ use impromptu_report::{
     study::{Finding, Study},
 };
 use impromptu_sim::trajectory::{Motion, growing_tones, single_tone};
-use impromptu_training::{Excitation, Labels, Purpose, Signal, derived};
+use impromptu_training::{FlightSet, Labels, Purpose, Signal, derived};
 use rayon::prelude::*;
 
 use super::{
@@ -39,7 +39,7 @@ fn signals(ground: &Ground<'_>) -> Vec<(&'static str, &'static str, Vec<Motion>)
     let seconds = 100.0 * f64::from(flights);
     // One flight has no fourth: the same again decides when to stop.
     let repeated = |motions: Vec<Motion>| [motions.clone(), motions].concat();
-    let random = |signal, flights, shortest_s| Excitation { signal, flights, shortest_s, ..multisine(flights) }.motions(seed);
+    let random = |signal, flights, shortest_s| FlightSet { signal, flights, shortest_s, ..multisine(flights) }.motions(seed);
     let sine = (0..3).map(|axis| single_tone(axis, 0.8, 6.0, 6.0 * (seconds / 18.0).floor().max(2.0))).collect();
     vec![
         ("sine", "one sine, axis by axis", repeated(sine)),
@@ -52,15 +52,15 @@ fn signals(ground: &Ground<'_>) -> Vec<(&'static str, &'static str, Vec<Motion>)
 
 /// Trains on each signal and flies validation strokes and test trajectories.
 pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> {
-    let plant = &ground.plant;
+    let closed_loop = &ground.closed_loop;
     let first = derived(ground.settings.seed, Purpose::Training);
     let found: Vec<Flown<4>> = signals(ground)
         .into_par_iter()
         .map(|(name, words, motions)| {
-            let logs = plant.collect(&motions, None, first)?;
-            let learned = learn(&ground.recipe(twelve(Origin::Measured)), plant, &logs, Labels::Corrections)?;
+            let logs = closed_loop.collect(&motions, None, first)?;
+            let learned = learn(&ground.recipe(twelve(Origin::Measured)), closed_loop, &logs, Labels::Corrections)?;
             let fly = |course: &Course, network, origin| {
-                course.reduction(plant, &learned.file(plant, network, &twelve(origin), Origin::Desired)?)
+                course.reduction(closed_loop, &learned.file(closed_loop, network, &twelve(origin), Origin::Desired)?)
             };
             let flown = [
                 fly(&ground.test, &learned.maps.network, Origin::Measured)?,
@@ -114,19 +114,19 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> 
 
 /// The same with noise: a Crazyflie in the lab, the window of desired positions, a linear map and the network that refines it.
 pub(super) fn crazyflie(ground: &Ground<'_>, crazyflie: &Crazyflie, study: &mut Study) -> anyhow::Result<()> {
-    let plant = &crazyflie.lab;
+    let closed_loop = &crazyflie.lab;
     let first = derived(ground.settings.seed, Purpose::Training);
     let found: Vec<Flown<2>> = signals(ground)
         .into_par_iter()
         .map(|(name, words, motions)| {
-            let logs = plant.collect(&motions, None, first)?;
-            let learned = learn(&crazyflie.recipe, plant, &logs, Labels::Corrections)?;
-            let fly = |file: Vec<u8>| crazyflie.lab_course.reduction(plant, &file);
+            let logs = closed_loop.collect(&motions, None, first)?;
+            let learned = learn(&crazyflie.recipe, closed_loop, &logs, Labels::Corrections)?;
+            let fly = |file: Vec<u8>| crazyflie.lab_course.reduction(closed_loop, &file);
             Ok(Flown {
                 name,
                 words,
                 determination: learned.maps.determination,
-                reductions: [fly(learned.ridge_file(plant)?)?, fly(learned.network_file(plant)?)?],
+                reductions: [fly(learned.ridge_file(closed_loop)?)?, fly(learned.network_file(closed_loop)?)?],
             })
         })
         .collect::<anyhow::Result<_>>()?;

@@ -62,11 +62,12 @@ pub(super) fn run(crazyflie: &Crazyflie, study: &mut Study) -> anyhow::Result<()
             };
             let recipe = Recipe { network, ..crazyflie.recipe.clone() };
             let mut flown = Vec::new();
-            for (plant, logs, courses) in loops {
-                let learned = learn(&recipe, plant, logs, Labels::Corrections)?;
-                let file = if hidden.is_empty() { learned.ridge_file(plant)? } else { learned.network_file(plant)? };
+            for (closed_loop, logs, courses) in loops {
+                let learned = learn(&recipe, closed_loop, logs, Labels::Corrections)?;
+                let file =
+                    if hidden.is_empty() { learned.ridge_file(closed_loop)? } else { learned.network_file(closed_loop)? };
                 for course in courses {
-                    flown.push(course.reduction(plant, &file)?);
+                    flown.push(course.reduction(closed_loop, &file)?);
                 }
             }
             Ok(flown)

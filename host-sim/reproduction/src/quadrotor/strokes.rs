@@ -29,22 +29,22 @@ type Flown = (&'static str, &'static str, Vec<f64>);
 /// The paper's loop and networks.
 pub(super) fn predecessor(ground: &Ground<'_>, networks: &Networks, study: &mut Study) -> anyhow::Result<()> {
     let section = "Strokes: the predecessor's loop";
-    let plant = &ground.plant;
+    let closed_loop = &ground.closed_loop;
     let seed = derived(ground.settings.seed, Purpose::Test);
     let test: Vec<_> = (0..ground.settings.strokes as u64)
-        .map(|index| stroke(seed, index).scaled(SPEED / STROKE_SPEED).sampled(plant.rate_hz()))
+        .map(|index| stroke(seed, index).scaled(SPEED / STROKE_SPEED).sampled(closed_loop.rate_hz()))
         .collect::<Result<_, _>>()?;
-    let course = Course::new(plant, test, seed)?;
+    let course = Course::new(closed_loop, test, seed)?;
     let mut flown: Vec<Flown> = vec![("baseline", "doing nothing", course.baseline.clone())];
-    without_model(ground.settings.trials, plant, &ground.validation, &course, section, study, &mut flown)?;
+    without_model(ground.settings.trials, closed_loop, &ground.validation, &course, section, study, &mut flown)?;
     let mut fly = |name, words, file: &[u8]| -> anyhow::Result<()> {
-        flown.push((name, words, course.errors(plant, file, NETWORK)?));
+        flown.push((name, words, course.errors(closed_loop, file, NETWORK)?));
         Ok(())
     };
-    fly("flatness", "flatness feed-forward", &networks.twelve.feedforward_file(plant)?)?;
-    fly("ridge_12", "ridge, 12 inputs", &networks.twelve_file(plant, &networks.twelve.maps.ridge)?)?;
-    fly("network_36", "network, 36 inputs", &networks.thirty_six.network_file(plant)?)?;
-    fly("network_12", "network, 12 inputs", &networks.twelve_file(plant, &networks.twelve.maps.network)?)?;
+    fly("flatness", "flatness feed-forward", &networks.twelve.feedforward_file(closed_loop)?)?;
+    fly("ridge_12", "ridge, 12 inputs", &networks.twelve_file(closed_loop, &networks.twelve.maps.ridge)?)?;
+    fly("network_36", "network, 36 inputs", &networks.thirty_six.network_file(closed_loop)?)?;
+    fly("network_12", "network, 12 inputs", &networks.twelve_file(closed_loop, &networks.twelve.maps.network)?)?;
     report(
         study,
         section,
@@ -59,13 +59,13 @@ pub(super) fn predecessor(ground: &Ground<'_>, networks: &Networks, study: &mut 
 /// This project's add-on.
 pub(super) fn crazyflie(ground: &Ground<'_>, crazyflie: &Crazyflie, study: &mut Study) -> anyhow::Result<()> {
     let section = "Strokes: a Crazyflie in the lab";
-    let (settings, plant) = (ground.settings, &crazyflie.lab);
+    let (settings, closed_loop) = (ground.settings, &crazyflie.lab);
     let recipe = Recipe { validation_speeds: vec![1.0], shares: vec![1.0], ..crazyflie.recipe.clone() };
-    let built = build(&recipe, plant, settings.seed, &mut |_| {})?;
+    let built = build(&recipe, closed_loop, settings.seed, &mut |_| {})?;
     let seed = derived(settings.seed, Purpose::Test);
-    let course = Course::new(plant, strokes(seed, settings.strokes, 1.0, plant.rate_hz())?, seed)?;
+    let course = Course::new(closed_loop, strokes(seed, settings.strokes, 1.0, closed_loop.rate_hz())?, seed)?;
     let mut flown: Vec<Flown> = vec![("baseline", "doing nothing", course.baseline.clone())];
-    without_model(settings.trials, plant, &crazyflie.lab_course, &course, section, study, &mut flown)?;
+    without_model(settings.trials, closed_loop, &crazyflie.lab_course, &course, section, study, &mut flown)?;
     let models = &built.models;
     for (name, words, file, lanes) in [
         ("flatness", "flatness feed-forward", &models.feedforward, NETWORK),
@@ -73,9 +73,9 @@ pub(super) fn crazyflie(ground: &Ground<'_>, crazyflie: &Crazyflie, study: &mut 
         ("network", "network lane (int8)", &models.int8, NETWORK),
         ("both", "both lanes (int8)", &models.int8, Lanes::BOTH),
     ] {
-        flown.push((name, words, course.errors(plant, file, lanes)?));
+        flown.push((name, words, course.errors(closed_loop, file, lanes)?));
     }
-    let switched_off = course.errors(plant, &models.int8, Lanes::NONE)?;
+    let switched_off = course.errors(closed_loop, &models.int8, Lanes::NONE)?;
     let difference = switched_off.iter().zip(&course.baseline).map(|(off, baseline)| (off - baseline).abs()).fold(0.0, f64::max);
     let what = "largest difference between a flight with both lanes switched off and the baseline's";
     study.find(Finding::new(section, "bypass_difference", &[1, 2], what, difference, "m").asked(Asked::AtMost(0.0)));
@@ -93,24 +93,24 @@ pub(super) fn crazyflie(ground: &Ground<'_>, crazyflie: &Crazyflie, study: &mut 
 /// Shifted references and iterative learning, both tuned on validation strokes.
 fn without_model(
     trials: usize,
-    plant: &Loop,
+    closed_loop: &Loop,
     validation: &Course,
     course: &Course,
     section: &str,
     study: &mut Study,
     flown: &mut Vec<Flown>,
 ) -> anyhow::Result<()> {
-    let shift = best_shift(plant, validation)?;
-    flown.push(("shifted", "references shifted by the best delay", shifted(plant, course, shift)?));
+    let shift = best_shift(closed_loop, validation)?;
+    flown.push(("shifted", "references shifted by the best delay", shifted(closed_loop, course, shift)?));
     let mut chosen = (f64::INFINITY, IterativeLearning { gain: 0.5, smoothing_s: 0.2, delay_s: shift });
     for learning in IterativeLearning::candidates(shift) {
-        let errors = learning.fly(plant, validation, trials)?;
+        let errors = learning.fly(closed_loop, validation, trials)?;
         let sum: f64 = errors[trials].iter().sum();
         if sum < chosen.0 {
             chosen = (sum, learning);
         }
     }
-    let errors = chosen.1.fly(plant, course, trials)?;
+    let errors = chosen.1.fly(closed_loop, course, trials)?;
     study.note(
         section,
         &format!(

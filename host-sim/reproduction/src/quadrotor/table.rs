@@ -34,9 +34,9 @@ pub(super) struct Networks {
 
 impl Networks {
     /// The file of one of the maps with 12 inputs.
-    pub(super) fn twelve_file(&self, plant: &Loop, network: &FloatNetwork) -> anyhow::Result<Vec<u8>> {
+    pub(super) fn twelve_file(&self, closed_loop: &Loop, network: &FloatNetwork) -> anyhow::Result<Vec<u8>> {
         let (inputs, base) = self.origins;
-        Ok(self.twelve.file(plant, network, &twelve(inputs), base)?)
+        Ok(self.twelve.file(closed_loop, network, &twelve(inputs), base)?)
     }
 }
 
@@ -45,8 +45,8 @@ fn best_origins(ground: &Ground<'_>, learned: &Learned) -> anyhow::Result<(Origi
     let mut best = (f64::NEG_INFINITY, (Origin::Desired, Origin::Desired));
     for inputs in [Origin::Desired, Origin::Measured] {
         for base in [Origin::Desired, Origin::Measured] {
-            let file = learned.file(&ground.plant, &learned.maps.network, &twelve(inputs), base)?;
-            let (mean, _) = ground.validation.reduction(&ground.plant, &file)?;
+            let file = learned.file(&ground.closed_loop, &learned.maps.network, &twelve(inputs), base)?;
+            let (mean, _) = ground.validation.reduction(&ground.closed_loop, &file)?;
             if mean > best.0 {
                 best = (mean, (inputs, base));
             }
@@ -57,28 +57,28 @@ fn best_origins(ground: &Ground<'_>, learned: &Learned) -> anyhow::Result<(Origi
 
 /// Trains both networks and flies the five trajectories.
 pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<Networks> {
-    let plant = &ground.plant;
+    let closed_loop = &ground.closed_loop;
     let lists = [("12", twelve(Origin::Measured)), ("36", thirty_six(Origin::Measured))];
     let learned: Vec<Learned> = lists
         .par_iter()
-        .map(|(_, list)| learn(&ground.recipe(list.clone()), plant, &ground.logs, Labels::Corrections))
+        .map(|(_, list)| learn(&ground.recipe(list.clone()), closed_loop, &ground.logs, Labels::Corrections))
         .collect::<anyhow::Result<_>>()?;
     let mut learned = learned.into_iter();
     let (Some(twelve), Some(thirty_six)) = (learned.next(), learned.next()) else { anyhow::bail!("two lists, two networks") };
     let networks = Networks { origins: best_origins(ground, &twelve)?, twelve, thirty_six };
     let files = [
-        [&networks.twelve.maps.network, &networks.twelve.maps.ridge].map(|map| networks.twelve_file(plant, map)),
-        [networks.thirty_six.network_file(plant), networks.thirty_six.ridge_file(plant)].map(|file| Ok(file?)),
+        [&networks.twelve.maps.network, &networks.twelve.maps.ridge].map(|map| networks.twelve_file(closed_loop, map)),
+        [networks.thirty_six.network_file(closed_loop), networks.thirty_six.ridge_file(closed_loop)].map(|file| Ok(file?)),
     ];
     let determinations = [networks.twelve.maps.determination, networks.thirty_six.maps.determination];
-    let baseline = ground.test.logs(plant, None)?;
+    let baseline = ground.test.logs(closed_loop, None)?;
     let mut logs: Vec<Vec<FlightLog>> = Vec::new();
     for ((((name, _), [file, ridge]), determination), (paper, paper_mean)) in
         lists.iter().zip(files).zip(determinations).zip(PAPER.iter().zip(PAPER_MEAN))
     {
         let (file, ridge) = (file?, ridge?);
         let column = format!("{name} inputs");
-        let errors = ground.test.errors(plant, &file, super::addon::NETWORK)?;
+        let errors = ground.test.errors(closed_loop, &file, super::addon::NETWORK)?;
         let reductions = ground.test.reductions(&errors);
         for ((trajectory, reduction), paper) in TEST.iter().zip(&reductions).zip(paper) {
             let key = trajectory.replace(':', "_").to_lowercase();
@@ -107,8 +107,8 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<Netw
         .paper(paper_mean)
         .cell(TABLE, "mean reduction over the five", &column);
         study.find(if *name == "12" { finding.asked(Asked::AtLeast(80.0)) } else { finding });
-        let (validation, worst) = ground.validation.reduction(plant, &file)?;
-        let (ridge, _) = ground.test.reduction(plant, &ridge)?;
+        let (validation, worst) = ground.validation.reduction(closed_loop, &file)?;
+        let (ridge, _) = ground.test.reduction(closed_loop, &ridge)?;
         for (key, what, value) in [
             ("validation", "mean over the validation strokes", validation),
             ("validation_worst", "worst of the validation strokes", worst),
@@ -123,7 +123,7 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<Netw
         let text = format!("{column}: mean RMS error");
         let found = Finding::new(SECTION, &format!("inputs_{name}_error"), &[25], &text, cm, "cm");
         study.find(found.cell(TABLE, "mean RMS error", &column));
-        logs.push(ground.test.logs(plant, Some(&file))?);
+        logs.push(ground.test.logs(closed_loop, Some(&file))?);
     }
     let cm = 100.0 * ground.test.baseline.iter().sum::<f64>() / 5.0;
     let found = Finding::new(SECTION, "baseline_error", &[20, 25], "baseline: mean RMS error", cm, "cm");

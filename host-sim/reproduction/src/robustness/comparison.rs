@@ -37,27 +37,27 @@ impl Comparison {
     ///
     /// # Errors
     /// If the model does not fit the flight stack.
-    pub fn fly(plant: &Loop, model: &Model<'_>, trajectories: &[Trajectory], seed: u64) -> Result<Self, RolloutError> {
+    pub fn fly(closed_loop: &Loop, model: &Model<'_>, trajectories: &[Trajectory], seed: u64) -> Result<Self, RolloutError> {
         let flights: Vec<(&Trajectory, u64)> = trajectories.iter().zip(seed..).collect();
-        Self::of(plant, model, &flights)
+        Self::of(closed_loop, model, &flights)
     }
 
     /// As [`Comparison::fly`], each trajectory under a seed of its own.
     ///
     /// # Errors
     /// If the model does not fit the flight stack.
-    pub fn of(plant: &Loop, model: &Model<'_>, flights: &[(&Trajectory, u64)]) -> Result<Self, RolloutError> {
+    pub fn of(closed_loop: &Loop, model: &Model<'_>, flights: &[(&Trajectory, u64)]) -> Result<Self, RolloutError> {
         let plans: Vec<FlightPlan<'_>> = WAYS
             .iter()
             .flat_map(|lanes| {
                 flights.iter().map(|&(trajectory, seed)| FlightPlan {
                     model: lanes.map(|lanes| (model, lanes)),
-                    guard: plant.guard,
+                    guard: closed_loop.guard,
                     ..FlightPlan::new(trajectory, seed)
                 })
             })
             .collect();
-        let records = plant.fly(&plans)?;
+        let records = closed_loop.fly(&plans)?;
         let errors = |way: usize| -> Vec<f64> { way_of(&records, way, flights.len()).map(|record| record.rms).collect() };
         let mut trips = [0; Trip::ALL.len()];
         let mut tripped = 0;

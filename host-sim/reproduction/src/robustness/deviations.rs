@@ -14,7 +14,7 @@ use super::{
 /// # Errors
 /// If the model does not fit the flight stack.
 pub fn fly_cases(
-    plant: &Loop,
+    closed_loop: &Loop,
     model: &Model<'_>,
     trajectories: &[Trajectory],
     seed: u64,
@@ -22,7 +22,9 @@ pub fn fly_cases(
     let late = Mismatch { delay_s: 0.02, ..Mismatch::NONE };
     let cases = [("nominal", Mismatch::NONE)].into_iter();
     let cases = cases.chain(CASES.iter().map(|case| (case.name, case.mismatch))).chain([("delay_plus_20_ms", late)]);
-    cases.map(|(name, mismatch)| Ok((name, Comparison::fly(&mismatch.applied(plant), model, trajectories, seed)?))).collect()
+    cases
+        .map(|(name, mismatch)| Ok((name, Comparison::fly(&mismatch.applied(closed_loop), model, trajectories, seed)?)))
+        .collect()
 }
 
 /// Flights at the deviations of each parameter, and in each wind.
@@ -37,8 +39,13 @@ pub struct Deviations {
 ///
 /// # Errors
 /// If the model does not fit the flight stack.
-pub fn fly_deviations(plant: &Loop, model: &Model<'_>, trajectories: &[Trajectory], seed: u64) -> anyhow::Result<Deviations> {
-    let fly = |mismatch: Mismatch| Ok(Comparison::fly(&mismatch.applied(plant), model, trajectories, seed)?);
+pub fn fly_deviations(
+    closed_loop: &Loop,
+    model: &Model<'_>,
+    trajectories: &[Trajectory],
+    seed: u64,
+) -> anyhow::Result<Deviations> {
+    let fly = |mismatch: Mismatch| Ok(Comparison::fly(&mismatch.applied(closed_loop), model, trajectories, seed)?);
     let parameter = |parameter: &Parameter| {
         DEVIATIONS.iter().map(|deviation| fly((parameter.at)(1.0 + deviation / 100.0))).collect::<anyhow::Result<Vec<_>>>()
     };

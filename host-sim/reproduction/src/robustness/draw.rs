@@ -87,16 +87,21 @@ pub struct DrawSettings {
 
 impl DrawSettings {
     /// Settings for a loop and a model.
-    pub fn new(plant: &Loop, model: &Model<'_>, seed: u64, draws: u32, strokes: usize, ranges: Ranges) -> Self {
+    pub fn new(closed_loop: &Loop, model: &Model<'_>, seed: u64, draws: u32, strokes: usize, ranges: Ranges) -> Self {
         let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
         // The guard's settings are part of the software; vehicle, stack and condition can come from files.
-        let constants = serde_json::json!([plant.vehicle, plant.settings, plant.condition, plant.guard == GuardSettings::OFF]);
+        let constants = serde_json::json!([
+            closed_loop.vehicle,
+            closed_loop.settings,
+            closed_loop.condition,
+            closed_loop.guard == GuardSettings::OFF
+        ]);
         Self {
             seed,
             draws,
             strokes,
             ranges,
-            nominal: name(plant),
+            nominal: name(closed_loop),
             nominal_crc32: crc.checksum(constants.to_string().as_bytes()),
             model_crc32: model.checksum(),
             software: format!("host-sim {}", env!("CARGO_PKG_VERSION")),
@@ -158,8 +163,8 @@ impl Draw {
 }
 
 /// Vehicle, gains and condition of a loop in words.
-pub fn name(plant: &Loop) -> String {
-    format!("{} {} {}", plant.vehicle.name, plant.gains, plant.condition.name)
+pub fn name(closed_loop: &Loop) -> String {
+    format!("{} {} {}", closed_loop.vehicle.name, closed_loop.gains, closed_loop.condition.name)
 }
 
 /// The name of a loop as the beginning of names in the JSON document and of files.
@@ -168,6 +173,6 @@ pub fn slug(nominal: &str) -> String {
 }
 
 /// The same of a loop.
-pub(super) fn slug_of(plant: &Loop) -> String {
-    slug(&name(plant))
+pub(super) fn slug_of(closed_loop: &Loop) -> String {
+    slug(&name(closed_loop))
 }

@@ -41,7 +41,7 @@ pub enum DrawsError {
 /// If the file is of other settings or damaged, or if something cannot be flown.
 pub fn fly_draws(
     header: &Header,
-    plant: &Loop,
+    closed_loop: &Loop,
     model: &Model<'_>,
     path: &Path,
     progress: &(dyn Fn(u64, u64) + Sync),
@@ -51,11 +51,11 @@ pub fn fly_draws(
     let numbers: Vec<u32> = header.shard.draws(settings.draws).collect();
     let held = ledger.len();
     let seed = derived(settings.seed, Purpose::Test);
-    let trajectories = strokes(seed, STROKES, 1.0, plant.rate_hz()).map_err(FlightsError::from)?;
+    let trajectories = strokes(seed, STROKES, 1.0, closed_loop.rate_hz()).map_err(FlightsError::from)?;
     for batch in numbers.get(held..).unwrap_or_default().chunks(BATCH) {
         let flown: Vec<Draw> = batch
             .par_iter()
-            .map(|&draw| fly_draw(settings, plant, model, &trajectories, seed, draw))
+            .map(|&draw| fly_draw(settings, closed_loop, model, &trajectories, seed, draw))
             .collect::<Result<_, _>>()?;
         for draw in &flown {
             ledger.append(draw)?;
@@ -69,7 +69,7 @@ pub fn fly_draws(
 
 fn fly_draw(
     settings: &DrawSettings,
-    plant: &Loop,
+    closed_loop: &Loop,
     model: &Model<'_>,
     trajectories: &[Trajectory],
     seed: u64,
@@ -80,7 +80,7 @@ fn fly_draw(
     let flights: Vec<(&Trajectory, u64)> = (first..first + settings.strokes)
         .map(|flight| (&trajectories[flight % trajectories.len()], seed.wrapping_add(flight as u64)))
         .collect();
-    let flown = Comparison::of(&mismatch.applied(plant), model, &flights)?;
+    let flown = Comparison::of(&mismatch.applied(closed_loop), model, &flights)?;
     let told = |errors: &[f64]| errors.iter().map(|error| error.is_finite().then_some(*error)).collect();
     Ok(Draw {
         draw,

@@ -1,6 +1,6 @@
 //! The linear-quadratic-Gaussian limit: the least error that any feedback on the reference could leave at hover.
 //!
-//! *in* an axis of the loop at hover, the effort; *out* the variance of the true position error; *never* a gain or a filter whose closed loop
+//! *in* an axis of the loop at hover, the control weight; *out* the variance of the true position error; *never* a gain or a filter whose closed loop
 //! is unstable; *source* Åström and Wittenmark, Computer-Controlled Systems, chapter 11: linear-quadratic regulator, Kalman filter that uses
 //! the newest measurement, Lyapunov equation of both together.
 
@@ -22,7 +22,7 @@ pub struct Limit {
     /// Expected square of the position error, m².
     pub variance: f64,
     /// Expected square of the correction, m².
-    pub effort: f64,
+    pub mean_square_control: f64,
 }
 
 /// Iterations of the filter's Riccati equation: at 100 Hz more than five minutes of flight.
@@ -84,13 +84,13 @@ fn filter(axis: &HoverAxis) -> Option<DMatrix<f64>> {
     None
 }
 
-/// The limit at an effort (weight on r², per m², beside 1 on the square of the position error); nothing if the equations have no solution.
-pub fn limit(axis: &HoverAxis, effort: f64) -> Option<Limit> {
+/// The limit at a control weight (weight on r², per m², beside 1 on the square of the position error); nothing if the equations have no solution.
+pub fn limit(axis: &HoverAxis, control_weight: f64) -> Option<Limit> {
     let size = axis.dynamics.nrows();
     let mut weight = DMatrix::zeros(size, size);
     weight[(POSITION, POSITION)] = 1.0;
     let closed = closed(axis);
-    let gain = riccati::solve(&closed, &axis.input, &weight, effort)?.gain;
+    let gain = riccati::solve(&closed, &axis.input, &weight, control_weight)?.gain;
     let filter = filter(axis)?;
 
     // State and error of the prior estimate; e_f = (I - L C) e - L n, r = -K x + K e_f.
@@ -113,9 +113,9 @@ pub fn limit(axis: &HoverAxis, effort: f64) -> Option<Limit> {
     of_output.columns_mut(0, size).copy_from(&(-&gain));
     of_output.columns_mut(size, size).copy_from(&(&gain * &corrected));
     let through_noise = &gain * &filter;
-    let effort =
+    let mean_square_control =
         (&of_output * &covariance * of_output.transpose())[0] + (&through_noise * noise(axis) * through_noise.transpose())[0];
-    Some(Limit { variance: covariance[(POSITION, POSITION)], effort, gain, filter })
+    Some(Limit { variance: covariance[(POSITION, POSITION)], mean_square_control, gain, filter })
 }
 
 /// Mean square of the position error over so many simulated ticks under the limit's regulator, m², with random numbers from `seed`.
@@ -165,24 +165,28 @@ mod tests {
     /// The linear loop jitters at hover as the simulated one does: the matrices are right, noise and delay among them.
     #[test]
     fn the_linear_loop_hovers_as_the_simulated_one() {
-        let plant = lab();
-        let expected: f64 = (0..3).map(|axis| baseline_variance(&linearise(&plant, axis).unwrap()).unwrap()).sum();
+        let closed_loop = lab();
+        let expected: f64 = (0..3).map(|axis| baseline_variance(&linearise(&closed_loop, axis).unwrap()).unwrap()).sum();
         let place = Sample { position: [0.0, 0.0, 1.0], ..Sample::default() };
         let trajectory =
-            Trajectory { name: "hover".into(), rate_hz: plant.rate_hz(), samples: vec![place; 6_000], scored: 500..6_000 };
+            Trajectory { name: "hover".into(), rate_hz: closed_loop.rate_hz(), samples: vec![place; 6_000], scored: 500..6_000 };
         let plans: Vec<FlightPlan<'_>> = (0..16).map(|seed| FlightPlan::new(&trajectory, seed)).collect();
-        let flown = plant.fly(&plans).unwrap();
+        let flown = closed_loop.fly(&plans).unwrap();
         let found = flown.iter().map(|record| record.rms * record.rms).sum::<f64>() / 16.0;
         let (found, expected) = (found.sqrt(), expected.sqrt());
         assert!((found / expected - 1.0).abs() < 0.03, "found {found}, expected {expected}");
     }
 
-    /// The expected variance is what a simulation of filter, regulator and loop shows, and more effort never costs.
+    /// The expected variance is what a simulation of filter, regulator and loop shows, and more control never costs.
     #[test]
-    fn the_limit_is_what_a_simulation_shows_and_falls_with_cheaper_effort() {
+    fn the_limit_is_what_a_simulation_shows_and_falls_with_cheaper_control() {
         let axis = linearise(&lab(), 0).unwrap();
-        let limits: Vec<Limit> = [3e-2, 3e-3, 3e-4].iter().map(|effort| limit(&axis, *effort).unwrap()).collect();
-        assert!(limits.windows(2).all(|pair| pair[1].variance <= pair[0].variance && pair[1].effort >= pair[0].effort));
+        let limits: Vec<Limit> = [3e-2, 3e-3, 3e-4].iter().map(|control_weight| limit(&axis, *control_weight).unwrap()).collect();
+        assert!(
+            limits
+                .windows(2)
+                .all(|pair| pair[1].variance <= pair[0].variance && pair[1].mean_square_control >= pair[0].mean_square_control)
+        );
         assert!(limits[0].variance < baseline_variance(&axis).unwrap());
         let found = simulated_variance(&axis, &limits[1], 60_000, 3);
         assert!((found / limits[1].variance - 1.0).abs() < 0.08, "{found} {}", limits[1].variance);

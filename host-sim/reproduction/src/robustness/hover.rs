@@ -11,7 +11,7 @@ use impromptu_flight::{
 };
 use impromptu_sim::{
     flights::Loop,
-    plant::{Disturbance, GRAVITY, LANES, Plant, State, States, Variation},
+    plant::{BATCH, Disturbance, GRAVITY, Plant, State, States, Variation},
     rollout::RolloutError,
 };
 use nalgebra::{DMatrix, DVector};
@@ -84,7 +84,7 @@ impl Components {
 
 /// A loop at hover.
 struct Hover<'a> {
-    plant: &'a Loop,
+    closed_loop: &'a Loop,
     state: State,
     tick: f64,
 }
@@ -92,22 +92,22 @@ struct Hover<'a> {
 impl Hover<'_> {
     /// The state a control tick later, under rotor commands and an acceleration.
     fn next(&self, state: &State, commands: [f64; ROTORS], axis: usize, acceleration: f64) -> State {
-        let plant = Plant::new(&self.plant.vehicle, [Variation::default(); LANES]);
+        let plant = Plant::new(&self.closed_loop.vehicle, [Variation::default(); BATCH]);
         let mut states = States::splat(state);
         let mut disturbance = Disturbance::default();
         let mut added = [0.0; 3];
         added[axis] = acceleration;
-        for lane in 0..LANES {
-            disturbance.set_lane(lane, [0.0; 3], added);
+        for member in 0..BATCH {
+            disturbance.set_member(member, [0.0; 3], added);
         }
-        plant.step(&mut states, &commands.map(|command| [command; LANES]), &disturbance, self.tick);
-        states.lane(0)
+        plant.step(&mut states, &commands.map(|command| [command; BATCH]), &disturbance, self.tick);
+        states.member(0)
     }
 
     /// Rotor commands (rad/s) of the flight stack in a control tick with a reference tick.
     fn commands(&self, state: &State) -> Result<[f64; ROTORS], RolloutError> {
-        let refuse = || RolloutError::Airframe(self.plant.vehicle.name.clone());
-        let mut flight = Flight::new(&self.plant.settings).ok_or_else(refuse)?;
+        let refuse = || RolloutError::Airframe(self.closed_loop.vehicle.name.clone());
+        let mut flight = Flight::new(&self.closed_loop.settings).ok_or_else(refuse)?;
         for _ in 0..PREVIEW / 2 {
             flight.push_setpoint(&Setpoint::default());
         }
@@ -120,20 +120,20 @@ impl Hover<'_> {
         );
         let known = known.ok_or_else(refuse)?;
         let (command, _) = flight.control(Tick(0), &known);
-        Ok(command.fractions().map(|fraction| f64::from(fraction) * self.plant.vehicle.rotor_speed_max))
+        Ok(command.fractions().map(|fraction| f64::from(fraction) * self.closed_loop.vehicle.rotor_speed_max))
     }
 }
 
-/// Linearises the closed position loop of `plant` along an axis (0, 1, 2: x, y, z). The delay of commands is not part of it.
+/// Linearises the closed position loop of `closed_loop` along an axis (0, 1, 2: x, y, z). The delay of commands is not part of it.
 ///
 /// # Errors
 /// If the vehicle cannot be flown.
-pub fn linearise(plant: &Loop, axis: usize) -> Result<HoverAxis, RolloutError> {
-    let vehicle = &plant.vehicle;
+pub fn linearise(closed_loop: &Loop, axis: usize) -> Result<HoverAxis, RolloutError> {
+    let vehicle = &closed_loop.vehicle;
     let mut state = State::at_rest([0.0; 3]);
     state.rotor_speeds = [(vehicle.mass * GRAVITY / (4.0 * vehicle.thrust_coefficient)).sqrt(); ROTORS];
-    let rates = plant.settings.rates;
-    let hover = Hover { plant, state, tick: 1.0 / f64::from(rates.control_hz) };
+    let rates = closed_loop.settings.rates;
+    let hover = Hover { closed_loop, state, tick: 1.0 / f64::from(rates.control_hz) };
     let parts = Components::new(axis);
     let count = parts.len();
 
@@ -176,24 +176,24 @@ pub fn linearise(plant: &Loop, axis: usize) -> Result<HoverAxis, RolloutError> {
     }
     let step = 0.1;
     let from_disturbance = differences([-step, step].map(|a| hover.next(&hover.state, hover.state.rotor_speeds, axis, a)), step);
-    Ok(lifted(plant, &parts, &plant_dynamics, &from_command, &from_disturbance, &control))
+    Ok(lifted(closed_loop, &parts, &plant_dynamics, &from_command, &from_disturbance, &control))
 }
 
 /// From control ticks to reference ticks: the state with the measurements that are on their way and the disturbance.
 fn lifted(
-    plant: &Loop,
+    closed_loop: &Loop,
     parts: &Components,
     plant_dynamics: &DMatrix<f64>,
     from_command: &DMatrix<f64>,
     from_disturbance: &DVector<f64>,
     control: &DMatrix<f64>,
 ) -> HoverAxis {
-    let rates = plant.settings.rates;
+    let rates = closed_loop.settings.rates;
     let tick = 1.0 / f64::from(rates.control_hz);
-    let late = (plant.condition.measurement_delay_s / tick).round() as usize;
+    let late = (closed_loop.condition.measurement_delay_s / tick).round() as usize;
     let (count, size) = (parts.len(), parts.len() + 2 * late + 1);
     let disturbance = size - 1;
-    let process = &plant.condition.weather.acceleration;
+    let process = &closed_loop.condition.weather.acceleration;
     let decay = libm::exp(-tick / process.correlation_time);
 
     // Attitude and rates are fed back in every control tick, position and velocity through what the position loop last asked for.
@@ -215,7 +215,7 @@ fn lifted(
     held.view_mut((0, 0), (count, ROTORS)).copy_from(from_command);
 
     // What each control tick adds: noise of attitude and rates through the commands, and the disturbance's own.
-    let noise = &plant.condition.noise;
+    let noise = &closed_loop.condition.noise;
     let mut added = DMatrix::zeros(size, size);
     if parts.tilt.is_some() {
         // A component of the quaternion is half an angle.

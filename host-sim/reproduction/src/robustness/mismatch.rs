@@ -58,8 +58,8 @@ impl Mismatch {
 
     /// The loop that is flown.
     #[must_use]
-    pub fn applied(&self, plant: &Loop) -> Loop {
-        let mut flown = plant.delayed(self.delay_s);
+    pub fn applied(&self, closed_loop: &Loop) -> Loop {
+        let mut flown = closed_loop.delayed(self.delay_s);
         let vehicle = &mut flown.vehicle;
         vehicle.mass *= self.mass;
         vehicle.thrust_coefficient *= self.thrust;
@@ -91,12 +91,12 @@ mod tests {
 
     #[test]
     fn the_flight_stack_does_not_know_of_a_mismatch_and_none_changes_nothing() {
-        let plant = Loop::new(Vehicle::named("crazyflie").unwrap(), "stock", Condition::named("lab").unwrap()).unwrap();
-        let same = Mismatch::default().applied(&plant);
-        assert_eq!((&same.vehicle, &same.condition), (&plant.vehicle, &plant.condition));
-        let heavy = Mismatch { mass: 1.1, thrust: 0.9, inertia: 1.2, wind: 2.0, ..Mismatch::default() }.applied(&plant);
-        assert_eq!(heavy.settings, plant.settings);
-        assert_eq!(heavy.vehicle.mass, 1.1 * plant.vehicle.mass);
+        let closed_loop = Loop::new(Vehicle::named("crazyflie").unwrap(), "stock", Condition::named("lab").unwrap()).unwrap();
+        let same = Mismatch::default().applied(&closed_loop);
+        assert_eq!((&same.vehicle, &same.condition), (&closed_loop.vehicle, &closed_loop.condition));
+        let heavy = Mismatch { mass: 1.1, thrust: 0.9, inertia: 1.2, wind: 2.0, ..Mismatch::default() }.applied(&closed_loop);
+        assert_eq!(heavy.settings, closed_loop.settings);
+        assert_eq!(heavy.vehicle.mass, 1.1 * closed_loop.vehicle.mass);
         assert_eq!(heavy.condition.weather.mean_wind, [2.0, 0.0, 0.0]);
     }
 }

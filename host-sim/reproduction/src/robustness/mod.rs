@@ -5,10 +5,10 @@
 
 mod cases;
 mod comparison;
+pub mod control_weight;
 mod deviations;
 pub mod draw;
 pub mod draws;
-pub mod effort;
 pub mod gaussian;
 pub mod hover;
 pub mod ledger;
@@ -47,7 +47,7 @@ pub fn run(settings: &Settings, command: &str, observer: &dyn Observer) -> anyho
     let parts: Vec<Study> = settings
         .loops
         .par_iter()
-        .map(|plant| study_loop(settings, plant, observer).with_context(|| name(plant)))
+        .map(|closed_loop| study_loop(settings, closed_loop, observer).with_context(|| name(closed_loop)))
         .collect::<anyhow::Result<_>>()?;
     let mut study = Study::new("Robustness of the add-on", command, settings.seed);
     report::explain(&mut study, settings);
@@ -59,25 +59,26 @@ pub fn run(settings: &Settings, command: &str, observer: &dyn Observer) -> anyho
     Ok(study)
 }
 
-fn study_loop(settings: &Settings, plant: &Loop, observer: &dyn Observer) -> anyhow::Result<Study> {
+fn study_loop(settings: &Settings, closed_loop: &Loop, observer: &dyn Observer) -> anyhow::Result<Study> {
     let mut study = Study::new("", "", settings.seed);
-    let name = name(plant);
+    let name = name(closed_loop);
     observer.stage(&format!("{name}: building the model"));
-    let built = build(&settings.recipe, plant, settings.seed, &mut |_| {})?;
+    let built = build(&settings.recipe, closed_loop, settings.seed, &mut |_| {})?;
     let model = Model::from_bytes(&built.models.int8)?;
     let seed = derived(settings.seed, Purpose::Test);
-    let trajectories = strokes(seed, settings.strokes, 1.0, plant.rate_hz())?;
+    let trajectories = strokes(seed, settings.strokes, 1.0, closed_loop.rate_hz())?;
     observer.stage(&format!("{name}: cases and deviations"));
-    report::tell_cases(&mut study, plant, &fly_cases(plant, &model, &trajectories, seed)?);
-    report::draw_deviations(&mut study, plant, &fly_deviations(plant, &model, &trajectories, seed)?);
+    report::tell_cases(&mut study, closed_loop, &fly_cases(closed_loop, &model, &trajectories, seed)?);
+    report::draw_deviations(&mut study, closed_loop, &fly_deviations(closed_loop, &model, &trajectories, seed)?);
     observer.stage(&format!("{name}: {} vehicles drawn", settings.draws));
-    let path = settings.out.join(format!("draws-{}.jsonl", slug_of(plant)));
-    let draws = DrawSettings::new(plant, &model, settings.seed, settings.draws, settings.draw_strokes, settings.ranges.clone());
-    let content = fly_draws(&Header { settings: draws, shard: Shard::WHOLE }, plant, &model, &path, &|_, _| {})?;
-    spread::tell(&mut study, &slug_of(plant), &content);
-    observer.stage(&format!("{name}: effort of the feedback lane"));
-    let designs = effort::sweep(&settings.recipe, plant, &built, &trajectories, settings.seed, seed)?;
-    let baseline = plant.errors(&trajectories, None, 1.0, seed)?;
-    report::draw_effort(&mut study, plant, &designs, &baseline)?;
+    let path = settings.out.join(format!("draws-{}.jsonl", slug_of(closed_loop)));
+    let draws =
+        DrawSettings::new(closed_loop, &model, settings.seed, settings.draws, settings.draw_strokes, settings.ranges.clone());
+    let content = fly_draws(&Header { settings: draws, shard: Shard::WHOLE }, closed_loop, &model, &path, &|_, _| {})?;
+    spread::tell(&mut study, &slug_of(closed_loop), &content);
+    observer.stage(&format!("{name}: control weight of the feedback lane"));
+    let designs = control_weight::sweep(&settings.recipe, closed_loop, &built, &trajectories, settings.seed, seed)?;
+    let baseline = closed_loop.errors(&trajectories, None, 1.0, seed)?;
+    report::draw_control_weight(&mut study, closed_loop, &designs, &baseline)?;
     Ok(study)
 }

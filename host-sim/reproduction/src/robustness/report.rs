@@ -1,4 +1,4 @@
-//! Cases, deviations and efforts as findings, figures and words.
+//! Cases, deviations and control weights as findings, figures and words.
 //!
 //! *in* what was flown; *out* entries of a [`Study`]; *never* a percentage without the centimetres that it is of; *source* none.
 
@@ -11,9 +11,9 @@ use impromptu_sim::flights::Loop;
 use super::{
     cases::{CASES, DEVIATIONS, PARAMETERS, WINDS},
     comparison::Comparison,
+    control_weight::Design,
     deviations::Deviations,
     draw::{name, slug_of},
-    effort::Design,
     gaussian,
     hover::linearise,
     settings::Settings,
@@ -21,7 +21,7 @@ use super::{
 
 const CASE_SECTION: &str = "Cases at test time only";
 const DEVIATION_SECTION: &str = "Deviations at test time only";
-const EFFORT_SECTION: &str = "What robustness costs";
+const CONTROL_WEIGHT_SECTION: &str = "What robustness costs";
 /// Reductions below this are drawn here, %: a lane that oscillates would leave the others no room.
 const FLOOR: f64 = -20.0;
 
@@ -67,29 +67,29 @@ pub(super) fn explain(study: &mut Study, settings: &Settings) {
         ),
     );
     study.note(
-        EFFORT_SECTION,
-        "Each point is a lane designed at another effort from the same logs, flown without the guard. The limit knows plant, noise and disturbance \
+        CONTROL_WEIGHT_SECTION,
+        "Each point is a lane designed at another control weight from the same logs, flown without the guard. The limit knows plant, noise and disturbance \
          exactly and has the network's errors not to mend: it is what the error would be if only noise and disturbance were left.",
     );
 }
 
 /// Bounds of the target table: vehicle, condition, case, mean, worst.
-fn asked(plant: &Loop, case: &str) -> (Option<f64>, Option<f64>) {
-    let (stock, condition) = (plant.gains == "stock", plant.condition.name.as_str());
+fn asked(closed_loop: &Loop, case: &str) -> (Option<f64>, Option<f64>) {
+    let (stock, condition) = (closed_loop.gains == "stock", closed_loop.condition.name.as_str());
     match (condition, case) {
         _ if !stock => (None, None),
         ("lab", "nominal") => (Some(96.5), Some(93.0)),
         ("rough", "nominal") => (Some(93.5), Some(87.0)),
         ("lab" | "rough", "delay_plus_20_ms") => (None, Some(0.0)),
-        ("lab", case) if plant.vehicle.name == "crazyflie" => {
+        ("lab", case) if closed_loop.vehicle.name == "crazyflie" => {
             (CASES.iter().find(|known| known.name == case).map(|known| known.asked), None)
         }
         _ => (None, None),
     }
 }
 
-pub(super) fn tell_cases(study: &mut Study, plant: &Loop, flown: &[(&'static str, Comparison)]) {
-    let (slug, loop_name) = (slug_of(plant), name(plant));
+pub(super) fn tell_cases(study: &mut Study, closed_loop: &Loop, flown: &[(&'static str, Comparison)]) {
+    let (slug, loop_name) = (slug_of(closed_loop), name(closed_loop));
     for (case, comparison) in flown {
         let words = match *case {
             "nominal" => "nominal",
@@ -106,7 +106,7 @@ pub(super) fn tell_cases(study: &mut Study, plant: &Loop, flown: &[(&'static str
             });
         };
         let (mean, worst) = comparison.both_lanes();
-        let (mean_bound, worst_bound) = asked(plant, case);
+        let (mean_bound, worst_bound) = asked(closed_loop, case);
         let [baseline, network, both] = comparison.centimetres();
         find("both_mean", "reduction, both lanes", mean, "%", mean_bound);
         find("both_worst", "worst flight, both lanes", worst, "%", worst_bound);
@@ -122,8 +122,8 @@ pub(super) fn tell_cases(study: &mut Study, plant: &Loop, flown: &[(&'static str
     }
 }
 
-pub(super) fn draw_deviations(study: &mut Study, plant: &Loop, flown: &Deviations) {
-    let (slug, loop_name) = (slug_of(plant), name(plant));
+pub(super) fn draw_deviations(study: &mut Study, closed_loop: &Loop, flown: &Deviations) {
+    let (slug, loop_name) = (slug_of(closed_loop), name(closed_loop));
     let ways: [Way; 2] =
         [("both", "both lanes", Comparison::both_lanes), ("network", "network lane alone", Comparison::network_alone)];
     for (way, words, reduction) in ways {
@@ -184,8 +184,13 @@ pub(super) fn draw_deviations(study: &mut Study, plant: &Loop, flown: &Deviation
 }
 
 /// Figures of a sweep; `baseline` are the errors of the nominal baseline's strokes, m.
-pub(super) fn draw_effort(study: &mut Study, plant: &Loop, designs: &[Design], baseline: &[f64]) -> anyhow::Result<()> {
-    let (slug, loop_name) = (slug_of(plant), name(plant));
+pub(super) fn draw_control_weight(
+    study: &mut Study,
+    closed_loop: &Loop,
+    designs: &[Design],
+    baseline: &[f64],
+) -> anyhow::Result<()> {
+    let (slug, loop_name) = (slug_of(closed_loop), name(closed_loop));
     let labels = ["nominal", "+10 ms", "+20 ms"];
     // As if nothing but the limit's error were left of each stroke.
     let limit =
@@ -194,26 +199,26 @@ pub(super) fn draw_effort(study: &mut Study, plant: &Loop, designs: &[Design], b
         let points = |index: usize| designs.iter().map(move |design| (x(design), design.reductions[index].0.max(FLOOR)));
         labels.iter().enumerate().map(|(index, label)| Curve::line_and_dots(label, points(index))).collect()
     };
-    let mut by_effort = reductions(&|design| design.effort);
-    let limits = designs.iter().filter_map(|design| Some((design.effort, limit(design.limit?))));
-    by_effort.push(Curve::line("linear-quadratic-Gaussian limit", limits));
+    let mut by_control_weight = reductions(&|design| design.control_weight);
+    let limits = designs.iter().filter_map(|design| Some((design.control_weight, limit(design.limit?))));
+    by_control_weight.push(Curve::line("linear-quadratic-Gaussian limit", limits));
     let figure = |name: &str, title: String, x: Axis, y: &str, curves: Vec<Curve>| Figure {
-        section: EFFORT_SECTION.into(),
+        section: CONTROL_WEIGHT_SECTION.into(),
         name: format!("{slug}_{name}"),
         title,
         x,
         y: Axis::linear(y),
         curves,
     };
-    let effort = || Axis::logarithmic("effort of the design [1]");
+    let control_weight = || Axis::logarithmic("control weight of the design [1]");
     let reduction = "mean reduction [%]";
     let drawn = format!("drawn from {FLOOR} % on");
     study.draw(figure(
-        "effort",
-        format!("{loop_name}: reduction by effort, and the limit ({drawn})"),
-        effort(),
+        "control_weight",
+        format!("{loop_name}: reduction by control weight, and the limit ({drawn})"),
+        control_weight(),
         reduction,
-        by_effort,
+        by_control_weight,
     ));
     // What has no margin in the identified loop is drawn at zero.
     let margin = |value: f32| f64::from(value).min(1e3);
@@ -234,19 +239,22 @@ pub(super) fn draw_effort(study: &mut Study, plant: &Loop, designs: &[Design], b
         ("gain margin [1]", |design| design.margins.gain),
         ("modulus margin [1]", |design| design.margins.modulus),
     ];
-    let curves = margins
-        .map(|(label, value)| Curve::line_and_dots(label, designs.iter().map(|design| (design.effort, margin(value(design))))));
-    study.draw(figure("margins", format!("{loop_name}: margins by effort"), effort(), "margin", curves.to_vec()));
+    let curves = margins.map(|(label, value)| {
+        Curve::line_and_dots(label, designs.iter().map(|design| (design.control_weight, margin(value(design)))))
+    });
+    study.draw(figure("margins", format!("{loop_name}: margins by control weight"), control_weight(), "margin", curves.to_vec()));
 
-    let mut find = |name: String, effort: &str, what: &str, value: f64, unit: &str| {
-        let text = format!("{loop_name}, {effort}: {what}");
-        study.find(
-            Finding::new(EFFORT_SECTION, &format!("{slug}_{name}"), &[], &text, value, unit).cell(&loop_name, effort, what),
-        );
+    let mut find = |name: String, control_weight: &str, what: &str, value: f64, unit: &str| {
+        let text = format!("{loop_name}, {control_weight}: {what}");
+        study.find(Finding::new(CONTROL_WEIGHT_SECTION, &format!("{slug}_{name}"), &[], &text, value, unit).cell(
+            &loop_name,
+            control_weight,
+            what,
+        ));
     };
     for design in designs {
-        let key = format!("effort_{:.1e}", design.effort).replace('.', "_").replace('-', "_minus_");
-        let with = format!("effort {:.1e}", design.effort);
+        let key = format!("control_weight_{:.1e}", design.control_weight).replace('.', "_").replace('-', "_minus_");
+        let with = format!("control weight {:.1e}", design.control_weight);
         for (index, label) in labels.iter().enumerate() {
             let (mean, worst) = design.reductions[index];
             let delay = ["nominal", "plus_10_ms", "plus_20_ms"][index];
@@ -263,7 +271,7 @@ pub(super) fn draw_effort(study: &mut Study, plant: &Loop, designs: &[Design], b
     }
     let mut jitter = 0.0;
     for axis in 0..3 {
-        jitter += gaussian::baseline_variance(&linearise(plant, axis)?).unwrap_or(f64::NAN);
+        jitter += gaussian::baseline_variance(&linearise(closed_loop, axis)?).unwrap_or(f64::NAN);
     }
     find("hover_cm".into(), "baseline", "RMS error at hover, from the linear loop", 100.0 * jitter.sqrt(), "cm");
     Ok(())

@@ -6,14 +6,14 @@ use impromptu_firmware::model::Model;
 use impromptu_report::render_study;
 use impromptu_sim::{condition::Condition, flights::Loop, plant::Vehicle};
 use impromptu_training::{
-    Excitation, LaneRecipe, Recipe, Rows, describe, feedforward, observer::Observer, supervised::TrainingSettings,
+    FlightSet, LaneRecipe, Recipe, Rows, describe, feedforward, observer::Observer, supervised::TrainingSettings,
 };
 
 use super::{
     CASES, DEVIATIONS, PARAMETERS, Settings, WINDS,
+    control_weight::CONTROL_WEIGHTS,
     draw::{DrawSettings, Ranges},
     draws::fly_draws,
-    effort::EFFORTS,
     ledger::{Header, LedgerError, Shard, merge},
     run,
 };
@@ -30,19 +30,19 @@ impl Observer for Silent {
 fn small() -> Recipe {
     let full = Recipe::default();
     Recipe {
-        excitations: full.excitations.iter().map(|of| Excitation { flights: 30, ..*of }).collect(),
+        training_flights: full.training_flights.iter().map(|of| FlightSet { flights: 30, ..*of }).collect(),
         network: TrainingSettings { epochs: 8, ..full.network },
         weight_decays: vec![0.03],
         shares: vec![1.0],
         fine_tuning: TrainingSettings { epochs: 1, ..full.fine_tuning },
-        lane: LaneRecipe { efforts: vec![6e-3], velocity_weights: vec![0.05], fast_limits: vec![0.1], ..full.lane },
+        lane: LaneRecipe { control_weights: vec![6e-3], velocity_weights: vec![0.05], fast_limits: vec![0.1], ..full.lane },
         validation_strokes: 4,
         ..full
     }
 }
 
 #[test]
-fn the_study_tells_every_case_deviation_vehicle_and_effort() {
+fn the_study_tells_every_case_deviation_vehicle_and_control_weight() {
     let folder = tempfile::tempdir().unwrap();
     let settings = Settings {
         seed: 1,
@@ -86,28 +86,31 @@ fn the_study_tells_every_case_deviation_vehicle_and_effort() {
     curves("draws");
 
     // Margins are bought with reduction, and no lane is better than the one that knows everything.
-    let figures = ["effort", "delay_margin", "modulus_margin", "margins"].map(curves);
+    let figures = ["control_weight", "delay_margin", "modulus_margin", "margins"].map(curves);
     assert!(figures.iter().flat_map(|curves| curves.iter()).all(|curve| !curve.points.is_empty()));
-    let at = |effort: f64, name: &str| value(&format!("effort_{effort:.1e}_{name}").replace('.', "_").replace("e-", "e_minus_"));
-    for pair in EFFORTS.windows(2) {
+    let at = |control_weight: f64, name: &str| {
+        value(&format!("control_weight_{control_weight:.1e}_{name}").replace('.', "_").replace("e-", "e_minus_"))
+    };
+    for pair in CONTROL_WEIGHTS.windows(2) {
         for margin in ["delay_margin", "gain_margin", "modulus_margin"] {
             assert!(at(pair[0], margin) <= at(pair[1], margin), "{margin} at {pair:?}");
         }
         assert!(at(pair[0], "limit") > at(pair[1], "limit"), "limit at {pair:?}");
     }
-    for effort in EFFORTS {
-        assert!(at(effort, "limit") > at(effort, "nominal_mean"), "{effort}");
+    for control_weight in CONTROL_WEIGHTS {
+        assert!(at(control_weight, "limit") > at(control_weight, "nominal_mean"), "{control_weight}");
     }
-    let [cheap, dear] = [EFFORTS[2], EFFORTS[EFFORTS.len() - 1]].map(|effort| at(effort, "nominal_mean"));
+    let [cheap, dear] =
+        [CONTROL_WEIGHTS[2], CONTROL_WEIGHTS[CONTROL_WEIGHTS.len() - 1]].map(|control_weight| at(control_weight, "nominal_mean"));
     assert!(cheap > dear, "{cheap} {dear}");
     assert!(render_study(&study).unwrap().contains("What robustness costs"));
 }
 
 /// A model that needs no training: flatness feed-forward.
-fn model(plant: &Loop) -> Vec<u8> {
+fn model(closed_loop: &Loop) -> Vec<u8> {
     let rows = Rows { calibration: Vec::new(), envelope: Vec::new(), label_range: [1.0; 6], data_crc: 0, count: 0 };
-    let description = describe(&Recipe::default(), plant, &rows, None, "flatness", "", 1);
-    feedforward(&plant.settings, description).unwrap()
+    let description = describe(&Recipe::default(), closed_loop, &rows, None, "flatness", "", 1);
+    feedforward(&closed_loop.settings, description).unwrap()
 }
 
 fn lab() -> Loop {
@@ -116,12 +119,12 @@ fn lab() -> Loop {
 
 /// Flies a shard of seven draws into a file.
 fn fly(folder: &Path, name: &str, seed: u64, shard: Shard) -> Result<PathBuf, String> {
-    let plant = lab();
-    let bytes = model(&plant);
+    let closed_loop = lab();
+    let bytes = model(&closed_loop);
     let model = Model::from_bytes(&bytes).unwrap();
-    let settings = DrawSettings::new(&plant, &model, seed, 7, 2, Ranges::default());
+    let settings = DrawSettings::new(&closed_loop, &model, seed, 7, 2, Ranges::default());
     let path = folder.join(name);
-    match fly_draws(&Header { settings, shard }, &plant, &model, &path, &|_, _| {}) {
+    match fly_draws(&Header { settings, shard }, &closed_loop, &model, &path, &|_, _| {}) {
         Ok(_) => Ok(path),
         Err(error) => Err(error.to_string()),
     }

@@ -3,9 +3,10 @@
 //! *in* a linear system; *out* modules that give y(t+r) = y_d(t+r); *never* a division by zero: a [`StateSpace`] has c A^(r-1) b ≠ 0;
 //! *source* Zhou 2017, equations (4) and (9): state-space and transfer-function law, in f32 or f64.
 
+use impromptu_diagnosis::transfer_function::TransferFunction;
 use nalgebra::RowDVector;
 
-use crate::siso::{Module, Moment, Scalar, StateSpace, TransferFunction};
+use crate::siso::{Module, Moment, Scalar, StateSpace};
 
 /// u = (y_d(t+r) - c A^r x) / (c A^(r-1) b).
 #[derive(Clone, Debug, PartialEq)]
@@ -35,19 +36,24 @@ impl<T: Scalar> Module<T> for StateSpaceLaw<T> {
 pub struct TransferFunctionLaw<T: Scalar> {
     numerator: Vec<T>,
     denominator: Vec<T>,
+    relative_degree: usize,
 }
 
 impl<T: Scalar> TransferFunctionLaw<T> {
-    /// The law of a transfer function.
+    /// The law of a transfer function without offset, whose dead time is its relative degree.
     pub fn new(transfer: &TransferFunction) -> Self {
         let round = |values: &[f64]| values.iter().map(|value| T::of(*value)).collect();
-        Self { numerator: round(&transfer.numerator), denominator: round(&transfer.denominator) }
+        Self {
+            numerator: round(&transfer.numerator),
+            denominator: round(&transfer.denominator),
+            relative_degree: transfer.dead_time,
+        }
     }
 }
 
 impl<T: Scalar> Module<T> for TransferFunctionLaw<T> {
     fn reference(&self, moment: &Moment<'_, T>) -> T {
-        let ahead = (self.denominator.len() - self.numerator.len()) as i64;
+        let ahead = self.relative_degree as i64;
         let desired = self.denominator.iter().enumerate();
         let desired = desired.fold(T::of(0.0), |sum, (lag, weight)| sum + *weight * moment.desired(ahead - lag as i64));
         let past = self.numerator.iter().enumerate().skip(1);

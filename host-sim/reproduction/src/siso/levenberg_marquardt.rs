@@ -5,6 +5,7 @@
 //! Pereyra 1973, with Kaufman's approximation of the Jacobian), which converges in a tenth of the steps.
 //! The crate `varpro` asks for one matrix for each of the 500 derivatives, `levenberg-marquardt` decomposes the whole Jacobian at each step.
 
+use impromptu_diagnosis::cholesky::Factor;
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -13,7 +14,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::siso::{
     network::{Activations, Network, Scaling},
-    normal_equations::solve,
     samples::Rows,
 };
 
@@ -202,7 +202,8 @@ pub fn train(rows: &Rows, settings: &Settings, seed: u64) -> Fit {
         loop {
             let mut damped = hessian.clone();
             (0..damped.nrows()).for_each(|index| damped[(index, index)] += damping * scale);
-            let next = solve(damped, &gradient).and_then(|step| {
+            let next = Factor::in_blocks(damped).map(|factor| factor.solve(&gradient));
+            let next = next.filter(|step| step.iter().all(|value| value.is_finite())).and_then(|step| {
                 let mut next = moved(&network, &-step);
                 problem.project(&mut next).filter(|found| found.cost < state.cost).map(|found| (next, found))
             });

@@ -2,9 +2,10 @@
 //!
 //! *in* rows and a penalty; *out* weights and an intercept; *never* a fit of rows that do not determine it; *source* Hoerl and Kennard 1970.
 
+use impromptu_diagnosis::{cholesky::Factor, least_squares::Regression};
 use nalgebra::{DMatrix, DVector};
 
-use crate::siso::{FeatureSet, Module, Moment, Rows, normal_equations::solve};
+use crate::siso::{FeatureSet, Module, Moment, Rows};
 
 /// A linear map of features.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,10 +24,14 @@ impl LinearMap {
         let means = DVector::from_iterator(inputs.ncols(), inputs.column_iter().map(|column| column.mean()));
         let centred = DMatrix::from_fn(inputs.nrows(), inputs.ncols(), |row, column| inputs[(row, column)] - means[column]);
         let mean = targets.mean();
-        let mut gram = centred.tr_mul(&centred);
-        let added = penalty * gram.trace() / gram.nrows() as f64;
-        gram.iter_mut().step_by(centred.ncols() + 1).for_each(|diagonal| *diagonal += added);
-        let weights = solve(gram, &centred.tr_mul(&targets.add_scalar(-mean)))?;
+        let differences = DMatrix::from_fn(targets.len(), 1, |row, _| targets[row] - mean);
+        let mut regression = Regression::of_table(&centred, &differences);
+        let added = penalty * regression.gram.trace() / centred.ncols() as f64;
+        regression.penalise(|_| added);
+        let weights = Factor::in_blocks(regression.gram)?.solve(&regression.cross.column(0));
+        if !weights.iter().all(|weight| weight.is_finite()) {
+            return None;
+        }
         let intercept = mean - weights.dot(&means);
         Some(Self { weights, intercept })
     }

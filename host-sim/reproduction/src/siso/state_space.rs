@@ -3,9 +3,10 @@
 //! *in* A, b, c; *out* relative degree, poles, zeros, DC gain, transfer function, and the system as a [`Plant`] in f32 or f64; *never* a
 //! relative degree beyond the order (there is none for a system without input); *source* Zhou 2017, equation (1) and the definition below it.
 
+use impromptu_diagnosis::transfer_function::TransferFunction;
 use nalgebra::{Complex, DMatrix, DVector, RowDVector};
 
-use crate::siso::{Plant, Scalar, TransferFunction};
+use crate::siso::{Plant, Scalar};
 
 /// Why three matrices are no system.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -95,7 +96,7 @@ impl StateSpace {
 
     /// Output over a constant reference, in the long run.
     pub fn dc_gain(&self) -> f64 {
-        self.transfer_function().dc_gain()
+        self.transfer_function().gain()
     }
 
     /// The transfer function, by the method of Leverrier and Faddeev for the denominator and the Markov parameters for the numerator.
@@ -110,11 +111,11 @@ impl StateSpace {
             product = next + DMatrix::identity(order, order) * coefficient;
         }
         let markov = self.markov(order);
-        // Numerator power n-k: sum of denominator coefficients times Markov parameters; zero below the relative degree.
+        // Numerator power n-k of z: sum of denominator coefficients times Markov parameters; zero below the relative degree.
         let numerator = (self.relative_degree..=order)
             .map(|power| (0..power).map(|lag| denominator[lag] * markov[power - 1 - lag]).sum())
             .collect();
-        TransferFunction { numerator, denominator }
+        TransferFunction { dead_time: self.relative_degree, numerator, denominator, offset: 0.0 }
     }
 
     /// The same system with coefficients rounded to `T`.
@@ -152,5 +153,37 @@ impl<T: Scalar> Plant<T> for StateSpace<T> {
     fn advance(&self, state: &mut [T], reference: T) {
         let next = &self.a * DVector::from_column_slice(state) + &self.b * reference;
         state.copy_from_slice(next.as_slice());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::siso::fixtures;
+
+    fn close(found: f64, expected: f64) -> bool {
+        (found - expected).abs() < 1e-9 * (1.0 + expected.abs())
+    }
+
+    #[test]
+    fn the_papers_systems_have_the_poles_zeros_gains_and_relative_degree_that_it_states() {
+        for (system, zero, gain) in
+            [(fixtures::minimum_phase(), 0.2, 16.0 / 7.0), (fixtures::non_minimum_phase(), 1.002, -18.0 / 7.0)]
+        {
+            let transfer = system.transfer_function();
+            assert_eq!((system.relative_degree(), transfer.dead_time, transfer.order()), (1, 1, 2));
+            assert!(close(system.poles()[0].re, 0.5) && close(system.poles()[1].re, 0.3));
+            assert!(close(system.zeros()[0].re, zero), "{:?}", system.zeros());
+            assert!(close(system.dc_gain(), gain), "{}", system.dc_gain());
+            assert_eq!(system.is_minimum_phase(), zero < 1.0);
+        }
+    }
+
+    #[test]
+    fn a_chain_of_delays_has_its_length_as_relative_degree_and_no_input_has_none() {
+        let chain = StateSpace::new(&[0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], &[0.0, 0.0, 2.0], &[1.0, 0.0, 0.0]).unwrap();
+        assert_eq!((chain.relative_degree(), chain.dc_gain()), (3, 2.0));
+        assert!(chain.zeros().is_empty());
+        assert!(StateSpace::new(&[0.5], &[0.0], &[1.0]).is_err());
     }
 }

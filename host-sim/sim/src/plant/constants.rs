@@ -1,12 +1,12 @@
-//! The constants of the equations, prepared: shared by all lanes, or of one lane.
+//! The constants of the equations, prepared: shared by all members, or of one member.
 
-use super::state::{LANES, Lanes};
+use super::state::{BATCH, Batch};
 use super::vehicle::Vehicle;
 
 /// Acceleration of gravity, m/s², along the world's -z.
 pub const GRAVITY: f64 = 9.81;
 
-/// How the vehicle in one lane differs from its data: factors on the nominal constants, 1 for none.
+/// How the vehicle in one member differs from its data: factors on the nominal constants, 1 for none.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Variation {
     /// On the mass; the payload sits in the centre of mass, so that the inertia stays. Positive.
@@ -51,16 +51,16 @@ pub(super) struct Constants {
     pub(super) couple: [f64; 3],
     speed_min: f64,
     speed_max: f64,
-    inverse_mass: Lanes,
-    thrust: Lanes,
-    drag_xy: Lanes,
-    drag_z: Lanes,
-    parasitic: [Lanes; 3],
-    motor_rate: Lanes,
+    inverse_mass: Batch,
+    thrust: Batch,
+    drag_xy: Batch,
+    drag_z: Batch,
+    parasitic: [Batch; 3],
+    motor_rate: Batch,
 }
 
-/// The constants that differ from lane to lane.
-pub(super) struct LaneConstants {
+/// The constants that differ from member to member.
+pub(super) struct MemberConstants {
     /// 1 / m, 1/kg.
     pub(super) inverse_mass: f64,
     /// k_eta, N s²/rad².
@@ -75,7 +75,7 @@ pub(super) struct LaneConstants {
 }
 
 impl Constants {
-    pub(super) fn new(vehicle: &Vehicle, variations: &[Variation; LANES]) -> Self {
+    pub(super) fn new(vehicle: &Vehicle, variations: &[Variation; BATCH]) -> Self {
         let position = |axis: usize| vehicle.rotors.map(|rotor| rotor.position[axis]);
         let product = |a: [f64; 4], b: [f64; 4]| std::array::from_fn(|rotor| a[rotor] * b[rotor]);
         let (x, y, z) = (position(0), position(1), position(2));
@@ -89,9 +89,10 @@ impl Constants {
         let rows =
             |matrix: &nalgebra::Matrix3<f64>| std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]));
         let principal = [vehicle.inertia.xx, vehicle.inertia.yy, vehicle.inertia.zz];
-        let lanes = |value: f64, factor: fn(&Variation) -> f64| std::array::from_fn(|lane| value * factor(&variations[lane]));
-        let inverse_lanes =
-            |value: f64, factor: fn(&Variation) -> f64| std::array::from_fn(|lane| 1.0 / (value * factor(&variations[lane])));
+        let members =
+            |value: f64, factor: fn(&Variation) -> f64| std::array::from_fn(|member| value * factor(&variations[member]));
+        let inverses =
+            |value: f64, factor: fn(&Variation) -> f64| std::array::from_fn(|member| 1.0 / (value * factor(&variations[member])));
         Self {
             x,
             y,
@@ -109,25 +110,25 @@ impl Constants {
             couple: std::array::from_fn(|axis| (principal[(axis + 1) % 3] - principal[(axis + 2) % 3]) / principal[axis]),
             speed_min: vehicle.rotor_speed_min,
             speed_max: vehicle.rotor_speed_max,
-            inverse_mass: inverse_lanes(vehicle.mass, |variation| variation.payload_factor),
-            thrust: lanes(vehicle.thrust_coefficient, |variation| variation.thrust_factor),
-            drag_xy: lanes(vehicle.rotor_drag, |variation| variation.drag_factor),
-            drag_z: lanes(vehicle.inflow_drag, |variation| variation.drag_factor),
-            parasitic: vehicle.parasitic_drag.map(|drag| lanes(drag, |variation| variation.drag_factor)),
-            motor_rate: inverse_lanes(vehicle.motor_time_constant, |variation| variation.motor_lag_factor),
+            inverse_mass: inverses(vehicle.mass, |variation| variation.payload_factor),
+            thrust: members(vehicle.thrust_coefficient, |variation| variation.thrust_factor),
+            drag_xy: members(vehicle.rotor_drag, |variation| variation.drag_factor),
+            drag_z: members(vehicle.inflow_drag, |variation| variation.drag_factor),
+            parasitic: vehicle.parasitic_drag.map(|drag| members(drag, |variation| variation.drag_factor)),
+            motor_rate: inverses(vehicle.motor_time_constant, |variation| variation.motor_lag_factor),
         }
     }
 
-    /// The constants of one lane.
+    /// The constants of one member.
     #[inline(always)]
-    pub(super) fn lane(&self, lane: usize) -> LaneConstants {
-        LaneConstants {
-            inverse_mass: self.inverse_mass[lane],
-            thrust: self.thrust[lane],
-            drag_xy: self.drag_xy[lane],
-            drag_z: self.drag_z[lane],
-            parasitic: [self.parasitic[0][lane], self.parasitic[1][lane], self.parasitic[2][lane]],
-            motor_rate: self.motor_rate[lane],
+    pub(super) fn member(&self, member: usize) -> MemberConstants {
+        MemberConstants {
+            inverse_mass: self.inverse_mass[member],
+            thrust: self.thrust[member],
+            drag_xy: self.drag_xy[member],
+            drag_z: self.drag_z[member],
+            parasitic: [self.parasitic[0][member], self.parasitic[1][member], self.parasitic[2][member]],
+            motor_rate: self.motor_rate[member],
         }
     }
 

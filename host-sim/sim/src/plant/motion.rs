@@ -1,6 +1,6 @@
 //! Rigid-body motion and the vector algebra of its equations, of one vehicle.
 //!
-//! Everything is inlined into the loop over the lanes, where each scalar becomes a vector of eight flights.
+//! Everything is inlined into the loop over the members, where each scalar becomes a vector of eight flights.
 
 /// What moves and turns, of one vehicle: the state without position and rotors. Its derivative has the same shape.
 #[derive(Clone, Copy)]

@@ -82,7 +82,7 @@ fn vehicles() -> BTreeMap<String, Vehicle> {
 }
 
 fn plants() -> BTreeMap<String, Plant> {
-    let plant = |vehicle| Plant::new(&vehicle, [Variation::default(); LANES]);
+    let plant = |vehicle| Plant::new(&vehicle, [Variation::default(); BATCH]);
     vehicles().into_iter().map(|(name, vehicle)| (name, plant(vehicle))).collect()
 }
 
@@ -97,13 +97,13 @@ fn state(row: &Row, prefix: &str) -> State {
     }
 }
 
-/// State, commands and disturbance of a row in every lane.
-fn inputs(row: &Row) -> (States, [Lanes; 4], Disturbance) {
+/// State, commands and disturbance of a row in every member.
+fn inputs(row: &Row) -> (States, [Batch; 4], Disturbance) {
     let mut disturbance = Disturbance::default();
-    for lane in 0..LANES {
-        disturbance.set_lane(lane, row.get(["windx", "windy", "windz"]), [0.0; 3]);
+    for member in 0..BATCH {
+        disturbance.set_member(member, row.get(["windx", "windy", "windz"]), [0.0; 3]);
     }
-    let commands = row.get(["c1", "c2", "c3", "c4"]).map(|command| [command; LANES]);
+    let commands = row.get(["c1", "c2", "c3", "c4"]).map(|command| [command; BATCH]);
     (States::splat(&state(row, "")), commands, disturbance)
 }
 
@@ -143,7 +143,7 @@ fn derivatives_and_wrenches_are_the_reference_simulators() {
     for row in rows("statedot.csv") {
         let (states, commands, disturbance) = inputs(&row);
         let plant = &plants[&row.set];
-        let rate = plant.derivative(&states, &commands, &disturbance).lane(3);
+        let rate = plant.derivative(&states, &commands, &disturbance).member(3);
         let wrench = plant.wrench(&states, &disturbance)[3];
         let mut add = |group, deviation| worst.add(group, deviation, &row);
         add("position", deviation(rate.position, row.get(["dx", "dy", "dz"])));
@@ -176,7 +176,7 @@ fn steps_follow_the_reference_solution() {
             for _ in 0..steps as usize {
                 plants[&row.set].step(&mut states, &commands, &disturbance, length / steps);
             }
-            let (found, truth) = (states.lane(0), state(row, "e_"));
+            let (found, truth) = (states.member(0), state(row, "e_"));
             let stiff = row.set.starts_with("hummingbird") || row.set.starts_with("synthetic");
             let mut add = |group, deviation| worst[usize::from(stiff)].add(group, deviation, row);
             add("position", deviation(found.position, truth.position));

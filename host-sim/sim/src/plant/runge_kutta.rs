@@ -1,4 +1,4 @@
-//! One step of the classical fourth-order Runge-Kutta method for all lanes.
+//! One step of the classical fourth-order Runge-Kutta method for all members.
 
 use std::marker::PhantomData;
 
@@ -6,14 +6,14 @@ use pulp::{Simd, WithSimd};
 
 use super::constants::Constants;
 use super::motion::Motion;
-use super::state::{Disturbance, LANES, Lanes, States, gather, scatter};
+use super::state::{BATCH, Batch, Disturbance, States, gather, scatter};
 use super::wrench::{Model, derivative};
 
 /// The arguments of a step, to be run with the instruction set that is found at run time.
 pub(super) struct Step<'a, M> {
     constants: &'a Constants,
     states: &'a mut States,
-    commands: &'a [Lanes; 4],
+    commands: &'a [Batch; 4],
     disturbance: &'a Disturbance,
     duration: f64,
     model: PhantomData<M>,
@@ -23,7 +23,7 @@ impl<'a, M: Model> Step<'a, M> {
     pub(super) fn new(
         constants: &'a Constants,
         states: &'a mut States,
-        commands: &'a [Lanes; 4],
+        commands: &'a [Batch; 4],
         disturbance: &'a Disturbance,
         duration: f64,
     ) -> Self {
@@ -40,7 +40,7 @@ impl<M: Model> WithSimd for Step<'_, M> {
     }
 }
 
-/// A plain loop over the lanes without a branch in its body, which the compiler turns into vector instructions
+/// A plain loop over the members without a branch in its body, which the compiler turns into vector instructions
 /// (everything below is inlined into it).
 ///
 /// Two of the five parts of the state need no stages of their own. The derivative of the position is the velocity, so
@@ -48,23 +48,23 @@ impl<M: Model> WithSimd for Step<'_, M> {
 /// equation with a constant command, so that each stage is the speed plus a multiple, known beforehand, of the
 /// distance to the command. Both are the Runge-Kutta step, rearranged.
 #[inline(always)]
-fn step<M: Model>(constants: &Constants, states: &mut States, commands: &[Lanes; 4], disturbance: &Disturbance, duration: f64) {
+fn step<M: Model>(constants: &Constants, states: &mut States, commands: &[Batch; 4], disturbance: &Disturbance, duration: f64) {
     let half = 0.5 * duration;
     let sixth = duration / 6.0;
     let sixth_squared = duration * sixth;
     // A local result, as nothing tells the compiler that the states do not overlap with the inputs.
     let mut next = *states;
-    for lane in 0..LANES {
-        let own = constants.lane(lane);
-        let wind = gather(&disturbance.wind_velocity, lane);
-        let pushed = gather(&disturbance.acceleration, lane);
+    for member in 0..BATCH {
+        let own = constants.member(member);
+        let wind = gather(&disturbance.wind_velocity, member);
+        let pushed = gather(&disturbance.acceleration, member);
         let start = Motion {
-            velocity: gather(&states.velocity, lane),
-            attitude: gather(&states.attitude, lane),
-            body_rates: gather(&states.body_rates, lane),
+            velocity: gather(&states.velocity, member),
+            attitude: gather(&states.attitude, member),
+            body_rates: gather(&states.body_rates, member),
         };
-        let speeds = gather(&states.rotor_speeds, lane);
-        let command = constants.clamp(gather(commands, lane));
+        let speeds = gather(&states.rotor_speeds, member);
+        let command = constants.clamp(gather(commands, member));
         let distance: [f64; 4] = [command[0] - speeds[0], command[1] - speeds[1], command[2] - speeds[2], command[3] - speeds[3]];
         let ratio = duration * own.motor_rate;
         let second = 0.5 * ratio;
@@ -86,16 +86,16 @@ fn step<M: Model>(constants: &Constants, states: &mut States, commands: &[Lanes;
         let rate = rate1.weighted_sum(&rate2, &rate3, &rate4);
         let finish = start.advance(&rate, sixth);
         for axis in 0..3 {
-            next.position[axis][lane] += duration * start.velocity[axis]
+            next.position[axis][member] += duration * start.velocity[axis]
                 + sixth_squared * (rate1.velocity[axis] + rate2.velocity[axis] + rate3.velocity[axis]);
         }
         let [w, x, y, z] = finish.attitude;
         let scale = 1.0 / ((w * w + x * x) + (y * y + z * z)).sqrt();
         let attitude = [w * scale, x * scale, y * scale, z * scale];
-        scatter(&mut next.velocity, lane, &finish.velocity);
-        scatter(&mut next.attitude, lane, &attitude);
-        scatter(&mut next.body_rates, lane, &finish.body_rates);
-        scatter(&mut next.rotor_speeds, lane, &advance(&speeds, &distance, last));
+        scatter(&mut next.velocity, member, &finish.velocity);
+        scatter(&mut next.attitude, member, &attitude);
+        scatter(&mut next.body_rates, member, &finish.body_rates);
+        scatter(&mut next.rotor_speeds, member, &advance(&speeds, &distance, last));
     }
     *states = next;
 }

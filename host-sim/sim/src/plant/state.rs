@@ -1,10 +1,10 @@
-//! What the plant carries from step to step: the states of [`LANES`] flights side by side, and of one flight.
+//! What the plant carries from step to step: the states of [`BATCH`] flights side by side, and of one flight.
 
 /// Flights that one call advances: as many f64 as one 512-bit register holds.
-pub const LANES: usize = 8;
+pub const BATCH: usize = 8;
 
-/// One scalar of each of the [`LANES`] flights.
-pub type Lanes = [f64; LANES];
+/// One scalar of each of the [`BATCH`] flights.
+pub type Batch = [f64; BATCH];
 
 /// The state of one flight.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,56 +28,56 @@ impl State {
     }
 }
 
-/// The states of [`LANES`] flights, structure of arrays: `field[component][lane]`, units and frames as in [`State`].
+/// The states of [`BATCH`] flights, structure of arrays: `field[component][member]`, units and frames as in [`State`].
 ///
 /// A time derivative has the same shape: each component is then "per second".
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]
 pub struct States {
     /// Positions, m, world ENU.
-    pub position: [Lanes; 3],
+    pub position: [Batch; 3],
     /// Velocities, m/s, world ENU.
-    pub velocity: [Lanes; 3],
+    pub velocity: [Batch; 3],
     /// Attitudes: Hamilton quaternions (w, x, y, z), body FLU to world ENU.
-    pub attitude: [Lanes; 4],
+    pub attitude: [Batch; 4],
     /// Body rates, rad/s, body FLU.
-    pub body_rates: [Lanes; 3],
+    pub body_rates: [Batch; 3],
     /// Rotor speeds, rad/s.
-    pub rotor_speeds: [Lanes; 4],
+    pub rotor_speeds: [Batch; 4],
 }
 
 impl States {
-    /// Every lane starts as `state`.
+    /// Every member starts as `state`.
     pub fn splat(state: &State) -> Self {
         Self {
-            position: state.position.map(|value| [value; LANES]),
-            velocity: state.velocity.map(|value| [value; LANES]),
-            attitude: state.attitude.map(|value| [value; LANES]),
-            body_rates: state.body_rates.map(|value| [value; LANES]),
-            rotor_speeds: state.rotor_speeds.map(|value| [value; LANES]),
+            position: state.position.map(|value| [value; BATCH]),
+            velocity: state.velocity.map(|value| [value; BATCH]),
+            attitude: state.attitude.map(|value| [value; BATCH]),
+            body_rates: state.body_rates.map(|value| [value; BATCH]),
+            rotor_speeds: state.rotor_speeds.map(|value| [value; BATCH]),
         }
     }
 
-    /// The flight in `lane` (`lane < LANES`).
+    /// The flight in `member` (`member < BATCH`).
     #[inline]
-    pub fn lane(&self, lane: usize) -> State {
+    pub fn member(&self, member: usize) -> State {
         State {
-            position: gather(&self.position, lane),
-            velocity: gather(&self.velocity, lane),
-            attitude: gather(&self.attitude, lane),
-            body_rates: gather(&self.body_rates, lane),
-            rotor_speeds: gather(&self.rotor_speeds, lane),
+            position: gather(&self.position, member),
+            velocity: gather(&self.velocity, member),
+            attitude: gather(&self.attitude, member),
+            body_rates: gather(&self.body_rates, member),
+            rotor_speeds: gather(&self.rotor_speeds, member),
         }
     }
 
-    /// Puts a flight into `lane` (`lane < LANES`).
+    /// Puts a flight into `member` (`member < BATCH`).
     #[inline]
-    pub fn set_lane(&mut self, lane: usize, state: &State) {
-        scatter(&mut self.position, lane, &state.position);
-        scatter(&mut self.velocity, lane, &state.velocity);
-        scatter(&mut self.attitude, lane, &state.attitude);
-        scatter(&mut self.body_rates, lane, &state.body_rates);
-        scatter(&mut self.rotor_speeds, lane, &state.rotor_speeds);
+    pub fn set_member(&mut self, member: usize, state: &State) {
+        scatter(&mut self.position, member, &state.position);
+        scatter(&mut self.velocity, member, &state.velocity);
+        scatter(&mut self.attitude, member, &state.attitude);
+        scatter(&mut self.body_rates, member, &state.body_rates);
+        scatter(&mut self.rotor_speeds, member, &state.rotor_speeds);
     }
 }
 
@@ -86,31 +86,31 @@ impl States {
 #[repr(align(64))]
 pub struct Disturbance {
     /// Velocity of the air, m/s, world ENU.
-    pub wind_velocity: [Lanes; 3],
+    pub wind_velocity: [Batch; 3],
     /// Acceleration added to the vehicle's own, m/s², world ENU: an unmodelled force divided by the mass.
-    pub acceleration: [Lanes; 3],
+    pub acceleration: [Batch; 3],
 }
 
 impl Disturbance {
-    /// Puts the air velocity (m/s) and the added acceleration (m/s²), both world ENU, of one flight into `lane` (`lane < LANES`).
+    /// Puts the air velocity (m/s) and the added acceleration (m/s²), both world ENU, of one flight into `member` (`member < BATCH`).
     #[inline]
-    pub fn set_lane(&mut self, lane: usize, wind_velocity: [f64; 3], acceleration: [f64; 3]) {
-        scatter(&mut self.wind_velocity, lane, &wind_velocity);
-        scatter(&mut self.acceleration, lane, &acceleration);
+    pub fn set_member(&mut self, member: usize, wind_velocity: [f64; 3], acceleration: [f64; 3]) {
+        scatter(&mut self.wind_velocity, member, &wind_velocity);
+        scatter(&mut self.acceleration, member, &acceleration);
     }
 }
 
-/// One lane of each component.
+/// One member of each component.
 #[inline(always)]
-pub(super) fn gather<const N: usize>(components: &[Lanes; N], lane: usize) -> [f64; N] {
-    std::array::from_fn(|component| components[component][lane])
+pub(super) fn gather<const N: usize>(components: &[Batch; N], member: usize) -> [f64; N] {
+    std::array::from_fn(|component| components[component][member])
 }
 
-/// Writes one lane of each component.
+/// Writes one member of each component.
 #[inline(always)]
-pub(super) fn scatter<const N: usize>(components: &mut [Lanes; N], lane: usize, values: &[f64; N]) {
+pub(super) fn scatter<const N: usize>(components: &mut [Batch; N], member: usize, values: &[f64; N]) {
     for (component, value) in components.iter_mut().zip(values) {
-        component[lane] = *value;
+        component[member] = *value;
     }
 }
 
@@ -119,7 +119,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_lane_comes_back_and_leaves_the_others_alone() {
+    fn a_member_comes_back_and_leaves_the_others_alone() {
         let rest = State::at_rest([1.0, 2.0, 3.0]);
         let moving = State {
             position: [4.0, 5.0, 6.0],
@@ -129,9 +129,9 @@ mod tests {
             rotor_speeds: [10.0, 11.0, 12.0, 13.0],
         };
         let mut states = States::splat(&rest);
-        states.set_lane(5, &moving);
-        for lane in 0..LANES {
-            assert_eq!(states.lane(lane), if lane == 5 { moving } else { rest });
+        states.set_member(5, &moving);
+        for member in 0..BATCH {
+            assert_eq!(states.member(member), if member == 5 { moving } else { rest });
         }
     }
 }

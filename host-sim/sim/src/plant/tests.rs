@@ -3,12 +3,12 @@
 use super::*;
 
 /// Eight different flights, none of them calm.
-fn flights() -> (States, [Lanes; 4], Disturbance) {
+fn flights() -> (States, [Batch; 4], Disturbance) {
     let mut states = States::splat(&State::at_rest([0.0; 3]));
-    let mut commands = [[0.0; LANES]; 4];
+    let mut commands = [[0.0; BATCH]; 4];
     let mut disturbance = Disturbance::default();
-    for lane in 0..LANES {
-        let k = lane as f64;
+    for member in 0..BATCH {
+        let k = member as f64;
         let state = State {
             position: [k, -k, 0.5 * k],
             velocity: [1.0 - 0.3 * k, 0.2 * k, 0.1],
@@ -16,21 +16,21 @@ fn flights() -> (States, [Lanes; 4], Disturbance) {
             body_rates: [0.5 * k, 1.0 - k, 2.0],
             rotor_speeds: [900.0, 1000.0 + 20.0 * k, 1100.0, 950.0],
         };
-        states.set_lane(lane, &state);
-        disturbance.set_lane(lane, [0.4 * k, -1.0, 0.2], [0.01, 0.02 * k, -0.3]);
+        states.set_member(member, &state);
+        disturbance.set_member(member, [0.4 * k, -1.0, 0.2], [0.01, 0.02 * k, -0.3]);
         for (rotor, command) in commands.iter_mut().enumerate() {
-            command[lane] = 1000.0 + 40.0 * k - 30.0 * rotor as f64;
+            command[member] = 1000.0 + 40.0 * k - 30.0 * rotor as f64;
         }
     }
     (states, commands, disturbance)
 }
 
-fn varied() -> [Variation; LANES] {
-    std::array::from_fn(|lane| Variation {
-        payload_factor: 1.0 + 0.02 * lane as f64,
-        thrust_factor: 1.0 - 0.03 * lane as f64,
-        drag_factor: 1.0 + 0.5 * lane as f64,
-        motor_lag_factor: 1.0 + 0.1 * lane as f64,
+fn varied() -> [Variation; BATCH] {
+    std::array::from_fn(|member| Variation {
+        payload_factor: 1.0 + 0.02 * member as f64,
+        thrust_factor: 1.0 - 0.03 * member as f64,
+        drag_factor: 1.0 + 0.5 * member as f64,
+        motor_lag_factor: 1.0 + 0.1 * member as f64,
     })
 }
 
@@ -39,7 +39,7 @@ fn plants() -> impl Iterator<Item = Plant> {
     Vehicle::names().map(|name| Plant::new(&Vehicle::named(name).unwrap(), varied()))
 }
 
-/// Bites where the compiler makes vectors of the loop over the lanes: in optimised builds.
+/// Bites where the compiler makes vectors of the loop over the members: in optimised builds.
 #[test]
 fn every_instruction_set_gives_the_same_bits() {
     let forms: Vec<Form> = plants().map(|plant| plant.form).collect();
@@ -64,23 +64,23 @@ fn every_instruction_set_gives_the_same_bits() {
 }
 
 #[test]
-fn a_flight_does_not_depend_on_its_lane_or_on_the_others() {
+fn a_flight_does_not_depend_on_its_place_or_on_the_others() {
     let vehicle = Vehicle::named("crazyflie-brushless").unwrap();
-    let plant = Plant::new(&vehicle, [varied()[5]; LANES]);
+    let plant = Plant::new(&vehicle, [varied()[5]; BATCH]);
     let (start, commands, disturbance) = flights();
     let mut together = start;
-    let mut alone = States::splat(&start.lane(5));
-    let same_commands = commands.map(|command| [command[5]; LANES]);
+    let mut alone = States::splat(&start.member(5));
+    let same_commands = commands.map(|command| [command[5]; BATCH]);
     let mut same_disturbance = Disturbance::default();
-    for lane in 0..LANES {
+    for member in 0..BATCH {
         let wind = gather(&disturbance.wind_velocity, 5);
-        same_disturbance.set_lane(lane, wind, gather(&disturbance.acceleration, 5));
+        same_disturbance.set_member(member, wind, gather(&disturbance.acceleration, 5));
     }
     for _ in 0..200 {
         plant.step(&mut together, &commands, &disturbance, 0.002);
         plant.step(&mut alone, &same_commands, &same_disturbance, 0.002);
     }
-    assert_eq!(alone, States::splat(&together.lane(5)));
+    assert_eq!(alone, States::splat(&together.member(5)));
 }
 
 #[test]
@@ -111,18 +111,18 @@ fn the_variations_and_the_disturbance_act_on_their_own_terms() {
     let vehicle = Vehicle::named("crazyflie").unwrap();
     let hover = (vehicle.mass * GRAVITY / (4.0 * vehicle.thrust_coefficient)).sqrt();
     let state = State { rotor_speeds: [hover; 4], ..State::at_rest([0.0; 3]) };
-    let mut variations = [Variation::default(); LANES];
+    let mut variations = [Variation::default(); BATCH];
     variations[1].payload_factor = 1.25;
     variations[2].thrust_factor = 0.9;
     variations[3].motor_lag_factor = 2.0;
     variations[4].drag_factor = 4.0;
     let mut disturbance = Disturbance::default();
-    disturbance.set_lane(5, [0.0; 3], [0.1, -0.2, 0.3]);
-    for lane in [0, 4] {
-        disturbance.set_lane(lane, [2.0, 0.0, 0.0], [0.0; 3]);
+    disturbance.set_member(5, [0.0; 3], [0.1, -0.2, 0.3]);
+    for member in [0, 4] {
+        disturbance.set_member(member, [2.0, 0.0, 0.0], [0.0; 3]);
     }
     let plant = Plant::new(&vehicle, variations);
-    let commands = [[hover + 72.0; LANES]; 4];
+    let commands = [[hover + 72.0; BATCH]; 4];
     let rate = plant.derivative(&States::splat(&state), &commands, &disturbance);
     let close = |found: f64, expected: f64| {
         assert!((found - expected).abs() < 1e-12, "{found} instead of {expected}");
@@ -142,12 +142,12 @@ fn the_variations_and_the_disturbance_act_on_their_own_terms() {
 #[test]
 fn commands_outside_the_range_act_as_its_ends() {
     let vehicle = Vehicle::named("crazyflie").unwrap();
-    let plant = Plant::new(&vehicle, [Variation::default(); LANES]);
+    let plant = Plant::new(&vehicle, [Variation::default(); BATCH]);
     let (start, _, disturbance) = flights();
     for (beyond, end) in [(1e9, vehicle.rotor_speed_max), (-5.0, 0.0)] {
         let (mut a, mut b) = (start, start);
-        plant.step(&mut a, &[[beyond; LANES]; 4], &disturbance, 0.002);
-        plant.step(&mut b, &[[end; LANES]; 4], &disturbance, 0.002);
+        plant.step(&mut a, &[[beyond; BATCH]; 4], &disturbance, 0.002);
+        plant.step(&mut b, &[[end; BATCH]; 4], &disturbance, 0.002);
         assert_eq!(a, b);
     }
 }
@@ -159,7 +159,7 @@ fn quaternions_stay_normalised_and_a_torque_free_body_keeps_its_momentum() {
     vehicle.rotor_drag = 0.0;
     vehicle.inflow_drag = 0.0;
     vehicle.translational_lift = 0.0;
-    let plant = Plant::new(&vehicle, [Variation::default(); LANES]);
+    let plant = Plant::new(&vehicle, [Variation::default(); BATCH]);
     let state = State { body_rates: [3.0, 0.1, 2.0], ..State::at_rest([0.0; 3]) };
     let mut states = States::splat(&state);
     let momentum = |state: &State| {
@@ -167,11 +167,11 @@ fn quaternions_stay_normalised_and_a_torque_free_body_keeps_its_momentum() {
         let body = inertia * nalgebra::Vector3::from(state.body_rates);
         Rotation::new(&state.attitude).to_world(&body.into())
     };
-    let before = momentum(&states.lane(0));
+    let before = momentum(&states.member(0));
     for _ in 0..5000 {
-        plant.step(&mut states, &[[0.0; LANES]; 4], &Disturbance::default(), 0.002);
+        plant.step(&mut states, &[[0.0; BATCH]; 4], &Disturbance::default(), 0.002);
     }
-    let after = states.lane(0);
+    let after = states.member(0);
     let length: f64 = after.attitude.iter().map(|value| value * value).sum();
     assert!((length - 1.0).abs() < 1e-15 * 4.0);
     for (a, b) in momentum(&after).iter().zip(before) {

@@ -1,6 +1,6 @@
 //! Forces and moments of rotors and air on one vehicle, and the accelerations that follow.
 
-use super::constants::{Constants, GRAVITY, LaneConstants};
+use super::constants::{Constants, GRAVITY, MemberConstants};
 use super::motion::{Motion, Rotation, cross, dot, multiply, total};
 
 /// Force and moment on a body.
@@ -15,7 +15,7 @@ pub struct Wrench {
 /// The terms of the equations that a kind of vehicle has.
 pub(super) trait Model {
     /// Wrench of rotors and air. `air`: airspeed v_a, m/s, body; `rates`: w, rad/s, body; `speeds`: O_i, rad/s.
-    fn wrench(shared: &Constants, own: &LaneConstants, air: &[f64; 3], rates: &[f64; 3], speeds: &[f64; 4]) -> Wrench;
+    fn wrench(shared: &Constants, own: &MemberConstants, air: &[f64; 3], rates: &[f64; 3], speeds: &[f64; 4]) -> Wrench;
 
     /// J^-1 (M - w x J w), rad/s², body.
     fn angular_acceleration(shared: &Constants, moment: &[f64; 3], rates: &[f64; 3]) -> [f64; 3];
@@ -25,7 +25,7 @@ pub(super) trait Model {
 #[inline(always)]
 pub(super) fn derivative<M: Model>(
     shared: &Constants,
-    own: &LaneConstants,
+    own: &MemberConstants,
     motion: &Motion,
     speeds: &[f64; 4],
     wind: &[f64; 3],
@@ -58,7 +58,7 @@ impl<const LIFT: bool> Model for Planar<LIFT> {
     #[inline(always)]
     fn wrench(
         shared: &Constants,
-        own: &LaneConstants,
+        own: &MemberConstants,
         &[ax, ay, az]: &[f64; 3],
         &[p, q, r]: &[f64; 3],
         speeds: &[f64; 4],
@@ -104,7 +104,7 @@ pub(super) struct Full;
 
 impl Model for Full {
     #[inline(always)]
-    fn wrench(shared: &Constants, own: &LaneConstants, air: &[f64; 3], rates: &[f64; 3], speeds: &[f64; 4]) -> Wrench {
+    fn wrench(shared: &Constants, own: &MemberConstants, air: &[f64; 3], rates: &[f64; 3], speeds: &[f64; 4]) -> Wrench {
         let airspeed = (air[0] * air[0] + air[1] * air[1] + air[2] * air[2]).sqrt();
         let mut force =
             [-airspeed * own.parasitic[0] * air[0], -airspeed * own.parasitic[1] * air[1], -airspeed * own.parasitic[2] * air[2]];

@@ -115,8 +115,8 @@ impl<'a, S: FlightStack> Pilot<'a, S> {
             let bits = random.random::<u64>();
             let sign = |bit: u32| if (bits >> bit) & 1 == 1 { dither.amplitude } else { -dither.amplitude };
             let offset = Vector3::new(sign(60) as f32, sign(61) as f32, sign(62) as f32);
-            self.stack.excite(offset);
-            self.recorder.iter_mut().for_each(|recorder| recorder.excitation(offset));
+            self.stack.set_dither(offset);
+            self.recorder.iter_mut().for_each(|recorder| recorder.dither(offset));
         }
     }
 

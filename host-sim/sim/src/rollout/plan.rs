@@ -13,7 +13,7 @@ use crate::{
     trajectory::Trajectory,
 };
 
-/// An independent excitation of the position reference: random signs, held for `hold_s`.
+/// An independent dither of the position reference: random signs, held for `hold_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dither {
     /// Amplitude on each axis, m.

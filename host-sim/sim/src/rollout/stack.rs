@@ -23,7 +23,7 @@ pub trait FlightStack {
     /// Reference tick of the next setpoint.
     fn next_setpoint(&self) -> i32;
     /// Offsets the position reference, m, world ENU.
-    fn excite(&mut self, offset: Vector3<f32>);
+    fn set_dither(&mut self, offset: Vector3<f32>);
     /// One control tick.
     fn step(&mut self, tick: Tick, state: &State) -> MotorCommand;
     /// The reference that the loop tracks now.
@@ -41,8 +41,8 @@ impl<S: FlightStack> FlightStack for &mut S {
         S::next_setpoint(self)
     }
 
-    fn excite(&mut self, offset: Vector3<f32>) {
-        S::excite(self, offset);
+    fn set_dither(&mut self, offset: Vector3<f32>) {
+        S::set_dither(self, offset);
     }
 
     fn step(&mut self, tick: Tick, state: &State) -> MotorCommand {
@@ -92,8 +92,8 @@ impl FlightStack for Software<'_> {
         self.inside.flight.next_setpoint()
     }
 
-    fn excite(&mut self, offset: Vector3<f32>) {
-        self.inside.flight.excite(offset);
+    fn set_dither(&mut self, offset: Vector3<f32>) {
+        self.inside.flight.set_dither(offset);
     }
 
     fn step(&mut self, tick: Tick, state: &State) -> MotorCommand {

@@ -27,7 +27,7 @@ mod shapes;
 mod smoothing_spline;
 mod strokes;
 mod table;
-mod tones;
+pub mod tones;
 
 pub use catalogue::{by_name, load, read};
 pub use error::TrajectoryError;

@@ -45,9 +45,9 @@ pub fn stroke(seed: u64, index: u64) -> Motion {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(mixed);
     loop {
         let path = placed(&page(&mut random), index % 4 == 3, &mut random);
-        let vigour = random.random_range(0.75..=1.0);
+        let speed_share = random.random_range(0.75..=1.0);
         let pace = Pace {
-            max_speed: STROKE_SPEED * vigour,
+            max_speed: STROKE_SPEED * speed_share,
             max_acceleration: STROKE_ACCELERATION,
             bend_speed: random.random_range(0.7..=0.95),
         };

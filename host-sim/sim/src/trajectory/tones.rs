@@ -1,20 +1,23 @@
-//! Sums of sinusoids and the smooth step that fades them in and out.
+//! Sums of sinusoids (multisines) and the smooth step that fades them in and out.
+//!
+//! *in* tones and an argument; *out* the value and its first two derivatives; *never* a jump of any of them; *source* the quintic that goes from
+//! rest to rest with the least jerk: Flash and Hogan, Journal of Neuroscience 5 (1985).
 
 use libm::{cos, sin};
 
 /// One sinusoid: amplitude * sin(rate * θ + phase).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Tone {
+pub struct Tone {
     /// Unit of the signal.
-    pub(crate) amplitude: f64,
+    pub amplitude: f64,
     /// Radians for each unit of the argument: rad/s for signals in time, a whole number for closed shapes.
-    pub(crate) rate: f64,
+    pub rate: f64,
     /// rad.
-    pub(crate) phase: f64,
+    pub phase: f64,
 }
 
-/// Value and first two derivatives of a sum of tones.
-pub(crate) fn sum(tones: &[Tone], argument: f64) -> [f64; 3] {
+/// Value and first two derivatives of a sum of tones, summed in their order.
+pub fn sum(tones: &[Tone], argument: f64) -> [f64; 3] {
     tones.iter().fold([0.0; 3], |[value, first, second], tone| {
         let angle = tone.rate * argument + tone.phase;
         let (s, c) = (tone.amplitude * sin(angle), tone.amplitude * cos(angle));
@@ -23,7 +26,7 @@ pub(crate) fn sum(tones: &[Tone], argument: f64) -> [f64; 3] {
 }
 
 /// Quintic step from 0 to 1 over 0..=1, flat outside, and its first two derivatives; all three are continuous.
-pub(crate) fn smooth_step(x: f64) -> [f64; 3] {
+pub fn smooth_step(x: f64) -> [f64; 3] {
     if x <= 0.0 {
         return [0.0; 3];
     }

@@ -38,10 +38,10 @@ fn what_is_predicted_for_a_vehicle_is_what_it_then_flies() {
 
 /// Predicted and flown reduction, %, axis by axis.
 fn predicted_and_flown(vehicle: &str, condition: &str, seed: u64) -> [(Interval, f64); 3] {
-    let plant = plant(vehicle, "stock", condition).unwrap();
-    let age_s = plant.condition.measurement_delay_s;
+    let closed_loop = closed_loop(vehicle, "stock", condition).unwrap();
+    let age_s = closed_loop.condition.measurement_delay_s;
     let recipe = Recipe::default();
-    let logs = Test::Multisine.fly(&plant, &recipe, 100 * seed).unwrap();
+    let logs = Test::Multisine.fly(&closed_loop, &recipe, 100 * seed).unwrap();
     let settings = Settings { seed, ..Settings::default() };
     let records: [Record; 3] = std::array::from_fn(|axis| of_logs(&logs, axis, age_s).unwrap());
     let found = records.each_ref().map(|record| diagnose(record, &settings).unwrap());
@@ -50,15 +50,15 @@ fn predicted_and_flown(vehicle: &str, condition: &str, seed: u64) -> [(Interval,
         let add_on = AddOn::fit(&record.segments, prediction.window, prediction.features).unwrap();
         (add_on, (found[axis].rate_hz / found[axis].sub_rate_hz).round() as usize)
     });
-    let excitation = Excitation { flights: 3, seconds: SECONDS, ..recipe.lane.excitation };
+    let flight_set = FlightSet { flights: 3, seconds: SECONDS, ..recipe.lane.dithered_flights };
     let desired: Vec<Trajectory> =
-        excitation.motions(9000 * seed).iter().map(|motion| motion.sampled(plant.rate_hz()).unwrap()).collect();
+        flight_set.motions(9000 * seed).iter().map(|motion| motion.sampled(closed_loop.rate_hz()).unwrap()).collect();
     let errors = |with: bool| -> [f64; 3] {
         let flown: Vec<Trajectory> =
             desired.iter().map(|desired| if with { adapted(desired, &add_ons) } else { desired.clone() }).collect();
         let plan = |(trajectory, seed)| FlightPlan { log: true, ..FlightPlan::new(trajectory, seed) };
         let plans: Vec<FlightPlan<'_>> = flown.iter().zip(7000 * seed..).map(plan).collect();
-        let mut logs: Vec<FlightLog> = plant.fly(&plans).unwrap().into_iter().filter_map(|record| record.log).collect();
+        let mut logs: Vec<FlightLog> = closed_loop.fly(&plans).unwrap().into_iter().filter_map(|record| record.log).collect();
         for (log, desired) in logs.iter_mut().zip(&desired) {
             log.rows.iter_mut().enumerate().for_each(|(tick, row)| row.desired = desired.sample_at(tick as i64));
         }

@@ -20,14 +20,14 @@ use crate::cli::{
     Invocation, configuration,
     model_file::ModelFile,
     output::write,
-    situation::{Situation, plant},
+    situation::{Situation, closed_loop},
 };
 
 /// Arguments of `study robustness`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 A model is built for each vehicle and condition and flown with mass, thrust, drag, delay, disturbance and wind that it was not made for, one at a
-time and, in the Monte Carlo run, all at once; then the design effort of the feedback lane is swept. The draws are kept in the folder
+time and, in the Monte Carlo run, all at once; then the control weight of the feedback lane is swept. The draws are kept in the folder
 (draws-*.jsonl): the same command goes on with them.
 
 Examples:
@@ -80,7 +80,7 @@ impl Robustness {
         let mut loops = Vec::new();
         for vehicle in &self.vehicle {
             for condition in &self.condition {
-                loops.push(plant(vehicle, &self.gains, condition)?);
+                loops.push(closed_loop(vehicle, &self.gains, condition)?);
             }
         }
         let settings = Settings {
@@ -122,17 +122,17 @@ pub(super) struct Draws {
 
 impl Draws {
     pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
-        let (plant, ranges) = (self.situation.plant()?, self.draw.ranges()?);
+        let (closed_loop, ranges) = (self.situation.closed_loop()?, self.draw.ranges()?);
         let seed = invocation.configuration.seed();
         let bytes = match &self.model {
             Some(path) => ModelFile::read(path)?.bytes().to_vec(),
-            None => build(invocation.configuration.recipe(), &plant, seed, &mut |_| {})?.models.int8,
+            None => build(invocation.configuration.recipe(), &closed_loop, seed, &mut |_| {})?.models.int8,
         };
         let model = Model::from_bytes(&bytes).with_context(|| match &self.model {
             Some(path) => format!("{}: refused", path.display()),
             None => "the model that was built".into(),
         })?;
-        let settings = DrawSettings::new(&plant, &model, seed, self.draw.draws, self.draw.draw_strokes as usize, ranges);
+        let settings = DrawSettings::new(&closed_loop, &model, seed, self.draw.draws, self.draw.draw_strokes as usize, ranges);
         let name = match self.shard {
             Shard::WHOLE => format!("draws-{}", slug(&settings.nominal)),
             Shard { part, of } => format!("draws-{}-{part}-of-{of}", slug(&settings.nominal)),
@@ -140,7 +140,7 @@ impl Draws {
         let path = invocation.configuration.folder()?.join(&name).with_extension("jsonl");
         let header = Header { settings, shard: self.shard };
         let console = &invocation.console;
-        let content = fly_draws(&header, &plant, &model, &path, &|done, of| console.steps(done, of))?;
+        let content = fly_draws(&header, &closed_loop, &model, &path, &|done, of| console.steps(done, of))?;
         console.finish();
         console.note(&format!("{}: {} draws, seed {seed}", path.display(), content.draws.len()));
         let mut study = Study::new("Monte Carlo over vehicles", &invocation.command, seed);

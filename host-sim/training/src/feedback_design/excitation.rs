@@ -12,12 +12,12 @@
 //! than the few largest jumps. Whether what is new in the reference is the dither, and not a glitch of the log, can only be
 //! told when the dither was logged as well.
 
-use nalgebra::{DMatrix, DVector};
+use impromptu_diagnosis::{cholesky::Factor, least_squares::Regression};
+use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 use super::DesignRefusal;
 use super::axis_log::{AxisLog, Columns};
-use super::normal_equations::ScaledCholesky;
 
 /// What moved the position reference independently of all else in the logs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,13 +36,12 @@ const STRETCH: usize = 200;
 /// Relative ridge of the prediction: far below any excitation (1e-6 of the reference's own size), far above rounding.
 const RIDGE: f64 = 1e-12;
 
-pub(super) fn measure(logs: &[AxisLog], columns: Columns, products: &DMatrix<f64>) -> Result<Excitation, DesignRefusal> {
+pub(super) fn measure(logs: &[AxisLog], columns: Columns, products: &Regression) -> Result<Excitation, DesignRefusal> {
     let newest = columns.reference_position(0);
     let others: Vec<usize> = (0..columns.regressors()).filter(|&index| index != newest).collect();
-    let sums = products.select_rows(&others).select_columns(&others);
-    let target = DVector::from_iterator(others.len(), others.iter().map(|&index| products[(index, newest)]));
-    let coefficients =
-        ScaledCholesky::new(&sums, RIDGE).ok_or(DesignRefusal::SingularRegression { lags: columns.lags })?.solve(&target);
+    let sums = products.select(&others, &[newest]);
+    let factor = Factor::of_unit_power(&sums.gram, RIDGE).ok_or(DesignRefusal::SingularRegression { lags: columns.lags })?;
+    let coefficients = factor.solve(&sums.cross.column(0));
     let mut predictor = DVector::zeros(columns.regressors() + 2);
     predictor[newest] = 1.0;
     for (&index, coefficient) in others.iter().zip(&coefficients) {

@@ -4,13 +4,13 @@
 //! to the collected one are fitted; never: a model which changes when the whole flight is moved in space; source: ARX
 //! prediction-error method (Ljung, System Identification, section 7.3), rows relative to the newest position.
 
+use impromptu_diagnosis::{cholesky::Factor, least_squares::Regression};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use super::DesignRefusal;
 use super::axis_log::{AxisLog, Columns};
 use super::excitation::{self, Excitation};
-use super::normal_equations::ScaledCholesky;
 
 /// How one measured quantity of the next tick depends on the newest `lags` samples of each signal, newest first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,8 +49,8 @@ impl ArxModel {
 #[derive(Clone, Debug)]
 pub struct IdentificationData {
     columns: Columns,
-    rows: usize,
-    products: DMatrix<f64>,
+    /// Regressors and, behind them, the two targets: each of them may be regressed on others.
+    products: Regression,
     excitation: Excitation,
 }
 
@@ -68,36 +68,33 @@ impl IdentificationData {
         }
         let columns = Columns { lags: longest_lags };
         let width = columns.regressors() + 2;
-        let mut products = DMatrix::zeros(width, width);
+        let mut products = Regression::new(width, 0);
         let mut block = DMatrix::zeros(width, ROWS_AT_A_TIME);
         let mut filled = 0;
-        let mut rows = 0;
         for log in logs {
             for k in columns.ticks(log.measured_position.len()) {
                 columns.fill(log, k, block.column_mut(filled).as_mut_slice());
                 filled += 1;
-                rows += 1;
                 if filled == ROWS_AT_A_TIME {
-                    products.gemm(1.0, &block, &block.transpose(), 1.0);
+                    products.push_block(block.as_view(), &DMatrix::zeros(filled, 0), None);
                     filled = 0;
                 }
             }
         }
-        let rest = block.columns(0, filled);
-        products.gemm(1.0, &rest, &rest.transpose(), 1.0);
+        products.push_block(block.columns(0, filled), &DMatrix::zeros(filled, 0), None);
 
         // Fewer rows than this leave more than a fifth of each coefficient to chance.
         let needed = 5 * width;
-        if rows < needed {
-            return Err(DesignRefusal::TooFewRows { rows, needed });
+        if products.rows < needed {
+            return Err(DesignRefusal::TooFewRows { rows: products.rows, needed });
         }
         let excitation = excitation::measure(logs, columns, &products)?;
-        Ok(Self { columns, rows, products, excitation })
+        Ok(Self { columns, products, excitation })
     }
 
     /// Rows (ticks with a full past) that were collected.
     pub fn rows(&self) -> usize {
-        self.rows
+        self.products.rows
     }
 
     /// Longest memory, in ticks, of a model that can be fitted.
@@ -122,37 +119,32 @@ impl IdentificationData {
         }
         let columns = Columns { lags };
         let selection = self.columns.selection(lags);
-        let sums = self.products.select_rows(&selection).select_columns(&selection);
-        let count = columns.regressors();
-        let plain = sums.view((0, 0), (count, count)).into_owned();
-        let targets = sums.view((0, count), (count, 2)).into_owned();
+        let (regressors, targets) = selection.split_at(columns.regressors());
+        let plain = self.products.select(regressors, targets);
 
-        let [position_power, velocity_power] = added_noise.map(|noise| self.rows as f64 * noise * noise);
+        let [position_power, velocity_power] = added_noise.map(|noise| plain.rows as f64 * noise * noise);
         let positions: Vec<usize> = (1..lags).map(|lag| columns.position(lag)).collect();
         let moved: Vec<usize> = positions.iter().copied().chain((0..lags).map(|lag| columns.reference_position(lag))).collect();
         let mut noisy = plain.clone();
-        let mut noisy_targets = targets.clone();
         for &row in &moved {
             for &column in &moved {
-                noisy[(row, column)] += position_power;
+                noisy.gram[(row, column)] += position_power;
             }
-            noisy_targets[(row, 0)] += position_power;
+            noisy.cross[(row, 0)] += position_power;
         }
         for &index in &positions {
-            noisy[(index, index)] += position_power;
+            noisy.gram[(index, index)] += position_power;
         }
         for lag in 0..lags {
             let index = columns.velocity(lag);
-            noisy[(index, index)] += velocity_power;
+            noisy.gram[(index, index)] += velocity_power;
         }
 
-        let solver = ScaledCholesky::new(&noisy, regularisation).ok_or(DesignRefusal::SingularRegression { lags })?;
+        let factor = Factor::of_unit_power(&noisy.gram, regularisation).ok_or(DesignRefusal::SingularRegression { lags })?;
         let mut residual = [0.0; 2];
         let mut solve = |output: usize| {
-            let coefficients = solver.solve(&noisy_targets.column(output).into_owned());
-            let explained = coefficients.dot(&targets.column(output));
-            let power = sums[(count + output, count + output)] - 2.0 * explained + coefficients.dot(&(&plain * &coefficients));
-            residual[output] = (power / self.rows as f64).max(0.0).sqrt();
+            let coefficients = factor.solve(&noisy.cross.column(output));
+            residual[output] = (plain.residual(output, &coefficients) / plain.rows as f64).sqrt();
             coefficients
         };
         let position = equation(columns, &solve(0), 1.0);

@@ -19,7 +19,6 @@ pub mod excitation;
 pub mod identification;
 pub mod lane;
 pub mod margins;
-mod normal_equations;
 mod refusal;
 pub mod response;
 pub mod riccati;
@@ -50,7 +49,8 @@ pub struct DesignSettings {
     /// Memory of the model on which the lane is judged, ticks; longer than `lags`.
     pub margin_lags: usize,
     /// Weight on the square of the lane's output, per m²; the square of the position error (m²) weighs 1.
-    pub effort: f64,
+    #[serde(alias = "effort")]
+    pub control_weight: f64,
     /// Weight on the square of the velocity error, s². Buys robustness against delay.
     pub velocity_weight: f64,
     /// Weight on the square of the integral of the position error, 1/s².
@@ -78,7 +78,7 @@ impl Default for DesignSettings {
             tick: 0.01,
             lags: 25,
             margin_lags: 45,
-            effort: 3e-3,
+            control_weight: 3e-3,
             velocity_weight: 0.05,
             integral_weight: 1.0,
             noise_factor: 1.0,
@@ -95,7 +95,7 @@ impl DesignSettings {
     fn check(&self) -> Result<(), DesignRefusal> {
         let positive = [
             ("tick", self.tick),
-            ("effort", self.effort),
+            ("control_weight", self.control_weight),
             ("regularisation", self.regularisation),
             ("least_excitation", self.least_excitation),
         ];
@@ -167,7 +167,8 @@ pub fn design(data: &IdentificationData, settings: &DesignSettings) -> Result<La
     weights[lags] = settings.velocity_weight;
     weights[3 * lags - 1] = settings.integral_weight;
     let weights = DMatrix::from_diagonal(&weights);
-    let solution = riccati::solve(&errors.dynamics, &errors.input, &weights, settings.effort).ok_or(DesignRefusal::NoGain)?;
+    let solution =
+        riccati::solve(&errors.dynamics, &errors.input, &weights, settings.control_weight).ok_or(DesignRefusal::NoGain)?;
     let spectral_radius = riccati::spectral_radius(&(&errors.dynamics - &errors.input * &solution.gain));
     // Without a weight the integral has no gain either, and its eigenvalue of 1 is nobody's.
     if spectral_radius >= 1.0 && settings.integral_weight > 0.0 {

@@ -83,7 +83,7 @@ pub enum DesignRefusal {
     },
     /// The lane has no steady state that its integral could hold.
     #[error(
-        "the past-output coefficients add up to {sum:.3}, the firmware needs less than 1: raise `effort`, \
+        "the past-output coefficients add up to {sum:.3}, the firmware needs less than 1: raise `control_weight`, \
          `velocity_weight` or `noise_factor`"
     )]
     NoSteadyState {

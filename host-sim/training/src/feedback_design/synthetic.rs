@@ -1,9 +1,14 @@
 //! Linear position loop of one axis, for the tests: PD on position and velocity, third-order attitude loop, delayed and noisy
-//! measurement, coloured disturbance. Simulated at 2 ms, position loop at 100 Hz.
+//! measurement, coloured disturbance, and the firmware's own feedback lane. Simulated at 2 ms, position loop at 100 Hz.
 
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
+use impromptu_firmware::{
+    feedback::{AxisState, Lane},
+    format::{Authority, Blob, FeedbackAxis, FeedbackLayout, MAX_ERRORS, Margins, Section},
+};
+use impromptu_sim::trajectory::tones::{self, Tone};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -97,69 +102,58 @@ impl Log {
     }
 }
 
-/// The lane as the firmware runs it.
-struct Lane {
-    gain: LaneGain,
-    errors: VecDeque<[f64; 2]>,
-    outputs: VecDeque<f64>,
-    integral: f64,
+/// The gain as a model file stores it, with the clamps of its fast and its slow part (m), and the coefficients' bytes.
+fn stored(gain: &LaneGain, [fast_limit, integral_limit]: [f64; 2]) -> (FeedbackLayout, Vec<u8>) {
+    let blob: Vec<u8> = gain.stored_coefficients().iter().flat_map(|value| (*value as f32).to_le_bytes()).collect();
+    let axis = FeedbackAxis {
+        output: 0,
+        errors: [(0, 0), (1, 1)].into_iter().collect(),
+        coefficients: Section { offset: 0, length: blob.len() as u32 },
+        integral: gain.integral_coefficient as f32,
+        fast_limit: fast_limit as f32,
+        integral_limit: integral_limit as f32,
+    };
+    // Authority is given at each step; what a flight would take from it plays no part.
+    let authority = Authority { channels: [].into_iter().collect(), scale: 1.0, error_scale: 1.0, decay: 1.0 };
+    let axes = std::iter::once(axis).collect();
+    (FeedbackLayout { lags: gain.lags() as u8, axes, authority, margins: Margins::default() }, blob)
 }
 
-impl Lane {
-    fn new(gain: LaneGain) -> Self {
-        Self {
-            errors: VecDeque::from(vec![[0.0; 2]; gain.error_coefficients.len()]),
-            outputs: VecDeque::from(vec![0.0; gain.past_output_coefficients.len() + 1]),
-            gain,
-            integral: 0.0,
-        }
-    }
-
-    fn step(&mut self, error: [f64; 2], [fast_limit, slow_limit]: [f64; 2]) -> f64 {
-        self.errors.pop_back();
-        self.errors.push_front(error);
-        let slow = self.gain.steady_integral_coefficient() * self.integral;
-        let bounded_slow = slow.clamp(-slow_limit, slow_limit);
-        let errors = self.gain.error_coefficients.iter().zip(&self.errors);
-        let outputs = self.gain.past_output_coefficients.iter().zip(&self.outputs);
-        let fast = errors.map(|(c, e)| c[0] * e[0] + c[1] * e[1]).sum::<f64>()
-            + outputs.map(|(c, u)| c * (u - bounded_slow)).sum::<f64>();
-        let bounded_fast = fast.clamp(-fast_limit, fast_limit);
-        let push = self.gain.steady_integral_coefficient() * error[0];
-        // The integral stops at its own clamp only: stopped at the fast one as well, it would never take over a constant
-        // disturbance that is larger than that clamp.
-        if slow == bounded_slow || push * slow < 0.0 {
-            self.integral += TICK * error[0];
-        }
-        let output = bounded_fast + bounded_slow;
-        self.outputs.pop_back();
-        self.outputs.push_front(output);
-        output
-    }
+/// The firmware's lane on one axis, with all its authority.
+struct Pilot<'a> {
+    lane: Lane<'a>,
+    state: AxisState,
 }
 
-/// Sum of tones and its derivative.
-fn multisine(tones: &[[f64; 3]], time: f64) -> [f64; 2] {
-    tones.iter().fold([0.0; 2], |[position, velocity], [amplitude, rate, phase]| {
-        let (sine, cosine) = (rate * time + phase).sin_cos();
-        [position + amplitude * sine, velocity + amplitude * rate * cosine]
-    })
+impl Pilot<'_> {
+    fn step(&mut self, error: [f64; 2]) -> f64 {
+        let mut errors = [0.0; MAX_ERRORS];
+        errors.iter_mut().zip(error).for_each(|(stored, error)| *stored = error as f32);
+        let output = self.state.step(&self.lane, &self.lane.axes()[0], errors, 1.0, TICK as f32, true);
+        self.state.applied(&self.lane, output);
+        f64::from(output)
+    }
 }
 
 pub(super) fn fly(flight: &Flight) -> Log {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(flight.seed);
-    let tones: Vec<[f64; 3]> = (0..12)
+    let tones: Vec<Tone> = (0..12)
         .map(|index| {
             let period = 1.5 * (20.0_f64 / 1.5).powf(f64::from(index) / 11.0);
-            [0.05 * period.sqrt(), TAU / period, TAU * random.random::<f64>()]
+            Tone { amplitude: 0.05 * period.sqrt(), rate: TAU / period, phase: TAU * random.random::<f64>() }
         })
         .collect();
     let desired_at = |time: f64| {
-        if flight.moving { multisine(&tones, time) } else { [0.0; 2] }
+        let [position, velocity, _] = if flight.moving { tones::sum(&tones, time) } else { [0.0; 3] };
+        [position, velocity]
     };
 
     let mut log = Log::default();
-    let mut lane = flight.lane.clone().map(Lane::new);
+    let stored = flight.lane.as_ref().map(|gain| stored(gain, flight.limits));
+    let mut pilot = stored.as_ref().map(|(layout, blob)| Pilot {
+        lane: Lane::new(layout, &Blob::new(blob)).expect("a lane that the firmware takes"),
+        state: AxisState::EMPTY,
+    });
     let [mut position, mut velocity] = desired_at(0.0);
     let mut attitude = [0.0_f64; 3];
     let mut gust = 0.0;
@@ -177,8 +171,7 @@ pub(super) fn fly(flight: &Flight) -> Log {
         let measured = [true_position + noise[0], true_velocity + noise[1]];
         let desired = desired_at(time);
         let matched = desired_at(time - DELAY);
-        let correction =
-            lane.as_mut().map_or(0.0, |lane| lane.step([measured[0] - matched[0], measured[1] - matched[1]], flight.limits));
+        let correction = pilot.as_mut().map_or(0.0, |pilot| pilot.step([measured[0] - matched[0], measured[1] - matched[1]]));
         if tick % 5 == 0 && random.random::<bool>() {
             dither = -dither;
         }

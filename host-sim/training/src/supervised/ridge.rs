@@ -5,6 +5,7 @@
 //! penalised: it is the mean of the labels. Normal equations are summed up in f64, block by block.
 
 use super::dataset::{Dataset, moments};
+use impromptu_diagnosis::{cholesky::Factor, least_squares::Regression};
 use impromptu_model_export::float_network::FloatNetwork;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -51,37 +52,27 @@ impl Ridge {
         let (input_mean, input_scale) = moments(data.inputs(), &row_weights);
         let (intercept, label_scale) = moments(data.labels(), &row_weights);
         let (inputs, labels) = (input_mean.len(), intercept.len());
-        let mut gram = DMatrix::<f64>::zeros(inputs, inputs);
-        let mut cross = DMatrix::<f64>::zeros(inputs, labels);
+        let mut regression = Regression::new(inputs, labels);
         for first in (0..data.rows()).step_by(BLOCK_ROWS) {
             let rows = BLOCK_ROWS.min(data.rows() - first);
             // One column for each row of data: both sides of the product are then filled in the order of memory.
             let standardised = DMatrix::from_fn(inputs, rows, |column, row| {
                 (f64::from(data.inputs().row(first + row)[column]) - input_mean[column]) / input_scale[column]
             });
-            let mut weighted = standardised.clone();
-            for (row, mut column) in weighted.column_iter_mut().enumerate() {
-                column *= row_weights[first + row] / data.rows() as f64;
-            }
+            let weights: Vec<f64> = row_weights[first..first + rows].iter().map(|weight| weight / data.rows() as f64).collect();
             let residual =
                 DMatrix::from_fn(rows, labels, |row, label| f64::from(data.labels().row(first + row)[label]) - intercept[label]);
-            gram.gemm(1.0, &weighted, &standardised.transpose(), 1.0);
-            cross.gemm(1.0, &weighted, &residual, 1.0);
+            regression.push_block(standardised.as_view(), &residual, Some(&weights));
         }
-        let mut largest = 0.0f64;
-        for index in 0..inputs {
-            let diagonal = &mut gram[(index, index)];
-            largest = largest.max(*diagonal);
-            // A constant input has no column of its own; any positive number makes its weight zero.
-            *diagonal += if *diagonal < 1e-9 { 1.0 } else { penalty };
-        }
-        let factor = gram.cholesky().ok_or(RidgeError::Singular { penalty })?;
+        let largest = regression.gram.diagonal().iter().fold(0.0f64, |largest, power| largest.max(*power));
+        // A constant input has no column of its own; any positive number makes its weight zero.
+        regression.penalise(|power| if power < 1e-9 { 1.0 } else { penalty });
+        let factor = Factor::new(regression.gram).ok_or(RidgeError::Singular { penalty })?;
         // Rounding can leave a tiny positive pivot where the exact one is zero: its solution would be noise.
-        let smallest_pivot = factor.l_dirty().diagonal().iter().fold(f64::INFINITY, |least, pivot| least.min(*pivot));
-        if smallest_pivot.powi(2) < 1e-13 * largest {
+        if factor.smallest_pivot() < 1e-13 * largest {
             return Err(RidgeError::Singular { penalty });
         }
-        let weights = factor.solve(&cross).transpose();
+        let weights = factor.solve(&regression.cross).transpose();
         Ok(Self { input_mean, input_scale, weights, intercept, label_scale })
     }
 

@@ -90,7 +90,12 @@ fn numbers() {
                 Refusal::Probe { index: 3 },
                 "probe 3 gives other bits"
             ),
-            case!("lane probe", |c, b| nudge(b, c.probes.feedback, 0), Refusal::Probe { index: u8::MAX }, "feedback lane's probe"),
+            case!(
+                "lane probe",
+                |c, b| nudge(b, c.probes.feedback, 0),
+                Refusal::Probe { index: u8::MAX },
+                "feedback lane's probe"
+            ),
         ],
     );
     check(

@@ -97,7 +97,12 @@ fn shapes_and_sections() {
                 Refusal::Value { what: "validated RMS of the monitor" },
                 "validated RMS of the monitor is out of"
             ),
-            case!("lags", |c, _b| c.feedback.as_mut().unwrap().lags = MAX_LAGS as u8 + 1, Refusal::Shape { .. }, "lane lags is 33"),
+            case!(
+                "lags",
+                |c, _b| c.feedback.as_mut().unwrap().lags = MAX_LAGS as u8 + 1,
+                Refusal::Shape { .. },
+                "lane lags is 33"
+            ),
             case!("no lags", |c, _b| c.feedback.as_mut().unwrap().lags = 0, Refusal::Shape { .. }, "lane lags is 0"),
             case!(
                 "no errors",

@@ -1,11 +1,13 @@
 //! A servo with the add-on as tasks of embassy: 20 s along a trajectory by the loop alone, then 20 s with the add-on.
 //!
 //! - in: the model, in the program's flash; the angle, here of a simulated servo
-//! - out: the motor's reference, here to the simulated servo; one line of JSON on standard output: errors in degrees, RMS and largest
-//! - never: clocks or pins, so that it runs on the emulated board as it is. SysTick wakes the control task; there is no time driver
+//! - out: the motor's reference, here to the simulated servo; one line of JSON on standard output: errors in degrees, RMS and
+//!   largest
+//! - never: clocks or pins, so that it runs on the emulated board as it is. SysTick wakes the control task; there is no time
+//!   driver
 //!
-//! Tasks of one executor wait for each other: a control tick may be late by one evaluation of the network. A loop that cannot bear that runs
-//! `control` in an `InterruptExecutor` of higher priority; nothing else changes.
+//! Tasks of one executor wait for each other: a control tick may be late by one evaluation of the network. A loop that cannot
+//! bear that runs `control` in an `InterruptExecutor` of higher priority; nothing else changes.
 //!
 //! `cargo run -p impromptu-example-embassy --target thumbv7em-none-eabihf --profile firmware` (needs qemu-system-arm).
 #![cfg_attr(target_os = "none", no_std, no_main)]
@@ -21,12 +23,14 @@ mod app {
     use embassy_executor::Spawner;
     use embassy_sync::{blocking_mutex::raw::CriticalSectionRawMutex, signal::Signal};
     use impromptu_firmware::{
+        AddOn,
         adapter::{Inference, Job, Lanes},
-        add_on::AddOn,
         model::Model,
         network::{Network, Scratch},
     };
     use static_cell::ConstStaticCell;
+    // The vector table of the microcontroller.
+    use stm32f4 as _;
 
     use crate::servo::{RATE_HZ, SIGNALS, Servo, TrackingError, desired};
 
@@ -36,7 +40,7 @@ mod app {
     /// Ticks of a flight.
     const TICKS: i32 = 20 * RATE_HZ as i32;
 
-    type Servant = AddOn<'static, 1, 1, 1, 128>;
+    type ServoAddOn = AddOn<'static, 1, 1, 1, 128>;
 
     static TICK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
     static JOB: Signal<CriticalSectionRawMutex, Job> = Signal::new();
@@ -50,13 +54,15 @@ mod app {
     #[embassy_executor::main]
     async fn main(spawner: Spawner) {
         static MODEL: ConstStaticCell<Model<'static>> = ConstStaticCell::new(Model::VACANT);
-        static ADD_ON: ConstStaticCell<Servant> = ConstStaticCell::new(AddOn::empty());
+        static ADD_ON: ConstStaticCell<ServoAddOn> = ConstStaticCell::new(AddOn::empty());
         static SCRATCH: ConstStaticCell<Scratch> = ConstStaticCell::new(Scratch::new());
         let (add_on, scratch) = (ADD_ON.take(), SCRATCH.take());
         let model = Model::load_into(MODEL.take(), FILE, scratch);
         match model.and_then(|model| add_on.load(model, SIGNALS, RATE_HZ).map(|()| model)) {
             Ok(model) => {
-                if let (Some(network), Ok(task)) = (model.network(), inference(network, scratch)) {
+                if let Some(network) = model.network()
+                    && let Ok(task) = inference(network, scratch)
+                {
                     spawner.spawn(task);
                 }
             }
@@ -91,7 +97,7 @@ mod app {
 
     /// Without the add-on, then with it.
     #[embassy_executor::task]
-    async fn control(add_on: &'static mut Servant) {
+    async fn control(add_on: &'static mut ServoAddOn) {
         add_on.defer();
         let alone = fly(add_on).await;
         add_on.reset(0);
@@ -103,7 +109,7 @@ mod app {
     }
 
     /// Follows the trajectory: at each tick it measures, asks the add-on for the reference, and drives the motor.
-    async fn fly(add_on: &mut Servant) -> [f32; 2] {
+    async fn fly(add_on: &mut ServoAddOn) -> [f32; 2] {
         let ahead = add_on.model().map_or(0, |model| model.card().preview_span().1 as i32);
         let (mut servo, mut error) = (Servo::new(), TrackingError::new());
         for tick in 0..TICKS {

@@ -1,8 +1,10 @@
 //! A servo with the add-on as tasks of RTIC: 20 s along a trajectory by the loop alone, then 20 s with the add-on.
 //!
 //! - in: the model, in the program's flash; the angle, here of a simulated servo
-//! - out: the motor's reference, here to the simulated servo; one line of JSON on standard output: errors in degrees, RMS and largest
-//! - never: a control tick that waits for the network. It touches no clocks or pins, so that it runs on the emulated board as it is
+//! - out: the motor's reference, here to the simulated servo; one line of JSON on standard output: errors in degrees, RMS and
+//!   largest
+//! - never: a control tick that waits for the network. It touches no clocks or pins, so that it runs on the emulated board as it
+//!   is
 //!
 //! | task | bound to | priority | |
 //! |---|---|---|---|
@@ -21,8 +23,8 @@ mod servo;
 mod app {
     use cortex_m::peripheral::syst::SystClkSource;
     use impromptu_firmware::{
+        AddOn,
         adapter::{Job, Lanes},
-        add_on::AddOn,
         model::Model,
         network::Scratch,
     };
@@ -82,6 +84,13 @@ mod app {
         timer.enable_interrupt();
         let (servo, error) = (Servo::new(), TrackingError::new());
         (Shared { add_on }, Local { model, scratch, servo, tick: 0, ahead, error, alone: None })
+    }
+
+    #[idle]
+    fn idle(_: idle::Context) -> ! {
+        loop {
+            cortex_m::asm::wfi();
+        }
     }
 
     #[task(binds = SysTick, priority = 2, local = [servo, tick, ahead, error, alone], shared = [add_on])]

@@ -6,7 +6,7 @@
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write};
 use impromptu_board::slots::{SLOT, slots};
-use impromptu_firmware::storage::{SlotIndex, Slot};
+use impromptu_firmware::storage::{Slot, SlotIndex};
 use stm32f4xx_hal::{flash::FlashExt as _, pac::FLASH};
 
 /// Offset of the slots from the first byte of the flash.

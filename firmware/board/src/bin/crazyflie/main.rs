@@ -8,7 +8,7 @@
 //!
 //! | task | bound to | priority | |
 //! |---|---|---|---|
-//! | `control` | SysTick, 500 Hz | 3 | hears the link, flies a tick, answers, feeds the watchdog |
+//! | `control` | SysTick, 500 Hz | 3 | receives, flies a tick, answers, feeds the watchdog |
 //! | `serial` | USART3 | 4 | a byte from the line, a byte to the line |
 //! | `inference` | an unused vector | 1 | evaluates the network, which may take until the next reference tick |
 //! | `storage` | an unused vector | 1 | stores a piece of a model while disarmed; the core stands still meanwhile |
@@ -136,18 +136,18 @@ mod app {
         if core::mem::take(piece) {
             rtic::pend(Interrupt::CRYP);
         }
-        let (came, heard) = Cycles.measure(|| {
+        let (came, received) = Cycles.measure(|| {
             let mut came = false;
             let mut bytes = [0; 32];
             loop {
                 match RECEIVED.take_some(&mut bytes) {
                     [] => break came,
-                    bytes => came |= TASKS.hear(application, bytes),
+                    bytes => came |= TASKS.on_bytes(application, bytes),
                 }
             }
         });
         *piece = came;
-        let tick = TASKS.fly(application, meters, &Cycles, heard);
+        let tick = TASKS.fly(application, meters, &Cycles, received);
         motors.drive(if application.storing() { &MotorCommand::OFF } else { &tick.command });
         if tick.job {
             rtic::pend(Interrupt::DCMI);

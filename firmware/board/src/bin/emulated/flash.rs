@@ -5,7 +5,7 @@
 //! - never: a file with half a model. Erasing empties it, the header's write fills it
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
-use impromptu_firmware::storage::{SlotIndex, RamFlash, Slot};
+use impromptu_firmware::storage::{RamFlash, Slot, SlotIndex};
 use semihosting::fs;
 use static_cell::ConstStaticCell;
 

@@ -6,7 +6,7 @@
 //!
 //! | task | bound to | priority | |
 //! |---|---|---|---|
-//! | `control` | SysTick, 500 Hz | 3 | hears the link, flies a tick, answers |
+//! | `control` | SysTick, 500 Hz | 3 | receives, flies a tick, answers |
 //! | `receive` | USART1 | 4 | queues the bytes of the serial port |
 //! | `inference` | an unused vector | 1 | evaluates the network, which may take until the next reference tick |
 //! | `storage` | an unused vector | 1 | stores a piece of a model |
@@ -102,13 +102,13 @@ mod app {
         let control::LocalResources { application, lockstep, meters, counter, .. } = cx.local;
         // Whole trajectories are uploaded in a tick before a flight.
         let flying = application.autopilot().in_flight();
-        let mut heard = 0;
-        let mut hear = |bytes: &[u8]| {
-            let (piece, instructions) = counter.measure(|| TASKS.hear(application, bytes));
+        let mut received = 0;
+        let mut on_bytes = |bytes: &[u8]| {
+            let (piece, instructions) = counter.measure(|| TASKS.on_bytes(application, bytes));
             if piece {
                 rtic::pend(Interrupt::CRYP);
             }
-            heard += instructions;
+            received += instructions;
         };
         let due = match lockstep {
             Some(lockstep) => {
@@ -116,7 +116,7 @@ mod app {
                 if flying {
                     meters.entry_latency_max = meters.entry_latency_max.max(entry);
                 }
-                lockstep.hear(hear);
+                lockstep.receive(on_bytes);
                 true
             }
             None => {
@@ -124,21 +124,21 @@ mod app {
                 loop {
                     match RECEIVED.take_some(&mut bytes) {
                         [] => break,
-                        bytes => hear(bytes),
+                        bytes => on_bytes(bytes),
                     }
                 }
                 // An upload comes without news of the attitude.
                 application.informed() || !application.autopilot().armed()
             }
         };
-        if due && TASKS.fly(application, meters, counter, heard).job {
+        if due && TASKS.fly(application, meters, counter, received).job {
             rtic::pend(Interrupt::DCMI);
         }
         match lockstep {
             Some(lockstep) => {
                 // The next tick is due, and this one is not done.
                 meters.deadline_misses += u32::from(application.autopilot().in_flight() && SCB::is_pendst_pending());
-                lockstep.say(application.outbox());
+                lockstep.send(application.outbox());
             }
             None => cx.shared.serial.lock(|serial| port::write_serial(serial, application.outbox())),
         }
@@ -153,7 +153,7 @@ mod app {
     #[task(binds = CRYP, priority = 1, local = [uploader], shared = [scratch])]
     fn storage(cx: storage::Context) {
         TASKS.store(cx.local.uploader, cx.shared.scratch);
-        // Over the serial port there is a control tick only when something is heard: the outcome is to be told.
+        // Over the serial port there is a control tick only when something is received: the outcome is to be told.
         SCB::set_pendst();
     }
 

@@ -31,8 +31,8 @@ impl Lockstep {
         Some(Self { from_host, to_host })
     }
 
-    /// Gives the bytes of one batch to `hear`, piece by piece.
-    pub(crate) fn hear(&mut self, mut hear: impl FnMut(&[u8])) {
+    /// Gives the bytes of one batch to `on_bytes`, piece by piece.
+    pub(crate) fn receive(&mut self, mut on_bytes: impl FnMut(&[u8])) {
         let mut bytes = [0; 256];
         let mut length = [0; 4];
         self.fill(&mut length);
@@ -43,13 +43,13 @@ impl Lockstep {
         while left > 0 {
             let Some(piece) = bytes.get_mut(..left.min(256) as usize) else { return };
             self.fill(piece);
-            hear(piece);
+            on_bytes(piece);
             left -= piece.len() as u32;
         }
     }
 
     /// Writes one batch.
-    pub(crate) fn say(&mut self, bytes: &[u8]) {
+    pub(crate) fn send(&mut self, bytes: &[u8]) {
         let length = (bytes.len() as u32).to_le_bytes();
         if self.to_host.write_all(&length).and_then(|()| self.to_host.write_all(bytes)).is_err() {
             process::exit(2);

@@ -4,12 +4,11 @@
 //! reference beyond the window's gain; *source* [`crate::siso::window`]. What counts is y - y_d while the trajectory lasts, from its first sample to
 //! its last: the loop may start before it, as long as the preview reaches, and rests at zero before.
 
+use impromptu_sim::trajectory::tones::smooth_step;
 use rayon::prelude::*;
 
 use super::PERIOD;
-use crate::siso::{
-    Module, Moment, Multisine, Run, Start, Window, fixtures, multisine::smooth_step, simulate, simulation::rms, window::offsets,
-};
+use crate::siso::{Module, Moment, Multisine, Run, Start, Window, fixtures, simulate, simulation::rms, window::offsets};
 
 /// A desired output, zero before it starts.
 pub struct Signal {
@@ -51,13 +50,19 @@ pub fn signals(each: u64, seed: u64) -> Vec<Signal> {
         let levels = Multisine::random(6, [1.0, 2.0], 2.0, 0.0, seed + 60);
         let steps = levels.clone();
         signals.push(Signal::new("smoothed steps", move |t| {
-            let moves =
-                steps.tones.iter().zip(0..).map(|(tone, step)| (tone[0] * libm::cos(tone[2]), 4.0 + 9.0 * f64::from(step)));
-            moves.map(|(height, start)| height * smooth_step((t - start) / 3.0)).sum()
+            let moves = steps
+                .tones
+                .iter()
+                .zip(0..)
+                .map(|(tone, step)| (tone.amplitude * libm::cos(tone.phase), 4.0 + 9.0 * f64::from(step)));
+            moves.map(|(height, start)| height * smooth_step((t - start) / 3.0)[0]).sum()
         }));
         signals.push(Signal::new("ramps", move |t| {
-            let moves =
-                levels.tones.iter().zip(0..).map(|(tone, ramp)| (tone[0] * libm::sin(tone[2]), 2.0 + 9.5 * f64::from(ramp)));
+            let moves = levels
+                .tones
+                .iter()
+                .zip(0..)
+                .map(|(tone, ramp)| (tone.amplitude * libm::sin(tone.phase), 2.0 + 9.5 * f64::from(ramp)));
             // A stretch of constant speed with rounded corners of half a second.
             moves.map(|(height, start)| height * ramp(t - start, 6.0, 0.5)).sum()
         }));

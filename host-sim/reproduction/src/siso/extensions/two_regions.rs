@@ -7,6 +7,7 @@
 use std::cell::RefCell;
 
 use impromptu_firmware::region::Selector;
+use impromptu_sim::trajectory::tones::Tone;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -104,7 +105,10 @@ fn learn(settings: &levenberg_marquardt::Settings, seed: u64) -> Modules {
 
 /// Trajectories: across the border and back, along the border within the noise, and random ones.
 fn signals(others: u64, seed: u64) -> Vec<(String, Multisine)> {
-    let tone = |amplitude, frequency, offset| Multisine { tones: vec![[amplitude, frequency, 0.0]], offset };
+    let tone = |amplitude, frequency, offset| {
+        let tone = Tone { amplitude, rate: std::f64::consts::TAU * frequency, phase: 0.0 };
+        Multisine { tones: vec![tone], offset }
+    };
     let mut signals = vec![
         ("across the border".to_owned(), tone(0.8, 0.15, TwoRegions::BORDER)),
         ("along the border".to_owned(), tone(0.02, 0.1, TwoRegions::BORDER)),

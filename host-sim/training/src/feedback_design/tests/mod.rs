@@ -49,8 +49,8 @@ fn design_beats_a_pd_on_the_reference() {
 }
 
 #[test]
-fn more_effort_weight_gives_a_larger_gain_margin_and_bears_gain_errors() {
-    let settings = DesignSettings { effort: 1e-2, ..DesignSettings::default() };
+fn more_control_weight_gives_a_larger_gain_margin_and_bears_gain_errors() {
+    let settings = DesignSettings { control_weight: 1e-2, ..DesignSettings::default() };
     let gentle = design(lab_data(), &settings).unwrap();
     let margin = |design: &LaneDesign| design.assessment.margins.as_ref().unwrap().gain_up.unwrap();
     assert!(margin(&gentle) > 1.2 * margin(&lab_design()));

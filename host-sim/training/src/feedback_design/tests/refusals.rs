@@ -81,7 +81,7 @@ fn bad_logs_and_settings_are_refused_by_name() {
         change(&mut settings);
         design(&data, &settings).unwrap_err().to_string()
     };
-    assert!(with(|settings| settings.effort = 0.0).contains("`effort`"));
+    assert!(with(|settings| settings.control_weight = 0.0).contains("`control_weight`"));
     assert!(with(|settings| settings.velocity_weight = f64::NAN).contains("`velocity_weight`"));
     assert!(with(|settings| settings.margin_lags = 20).contains("`margin_lags`"));
     assert!(with(|settings| settings.margin_lags = 26).contains("lags"));
