@@ -11,7 +11,9 @@ use garde::Validate;
 use impromptu_report::{FlightTrace, ModelCard, PerFlight, Results, summarise};
 use impromptu_sim::{condition::Condition, flight_log::FlightLog, flights::Loop, plant::Vehicle, trajectory::strokes};
 use impromptu_training::{
-    build::{Built, Purpose, build, derived},
+    Purpose,
+    build::{Built, build},
+    derived,
     files::{write_log, write_model_files},
     observer::Observer,
     recipe::{Recipe, not_negative, positive},

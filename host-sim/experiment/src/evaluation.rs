@@ -151,7 +151,7 @@ pub fn model_card(built: &Built, closed_loop: &Loop) -> Result<ModelCard, Export
     let bytes = &built.models.int8;
     let model = Model::from_bytes(bytes).map_err(ExportError::Refused)?;
     let card = model.card();
-    let network = &built.learned.quantised;
+    let network = &built.learned.exported;
     let dense: usize = network.layers.iter().map(|layer| layer.weights.len() + layer.bias.len()).sum();
     let skip = network.skip.as_ref().map_or(0, Vec::len);
     let difference = verify::difference(&model, network, &built.learned.rows.calibration);

@@ -8,11 +8,14 @@
 //! received); `measured_{x,y,z}_m`, `measured_{vx,vy,vz}_m_s` (as the loop received it, so as late as that);
 //! `true_{x,y,z}_m` (optional, simulators only). Further columns are ignored.
 
-use std::{fs::File, io, ops::Range, path::Path};
+use std::{io, ops::Range, path::Path};
 
 use impromptu_flight::quadrotor::MEASURED;
 
-use crate::trajectory::Sample;
+use crate::{
+    columns::{Table, TableError},
+    trajectory::Sample,
+};
 
 /// Measured channels behind position and velocity.
 pub const BODY: usize = MEASURED - 6;
@@ -54,42 +57,9 @@ pub struct FlightLog {
 /// Why a log cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
-    /// The file cannot be opened, read or written.
-    #[error("{file}: {source}")]
-    File {
-        /// The file.
-        file: String,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// Not CSV.
-    #[error("{file}: {source}")]
-    Csv {
-        /// The file.
-        file: String,
-        /// What is wrong, with the line.
-        source: csv::Error,
-    },
-    /// A column is missing.
-    #[error("{file}: column `{column}` is missing; `host-sim train --help` lists the columns")]
-    Column {
-        /// The file.
-        file: String,
-        /// The column.
-        column: String,
-    },
-    /// A cell is not a finite number.
-    #[error("{file}, line {line}: `{column}` is `{found}`, not a finite number; drop or repair the row")]
-    Cell {
-        /// The file.
-        file: String,
-        /// The line, from 1.
-        line: u64,
-        /// The column.
-        column: String,
-        /// The text.
-        found: String,
-    },
+    /// It is no table of numbers with the columns of a log.
+    #[error(transparent)]
+    Table(#[from] TableError),
     /// Time stands still or runs backwards.
     #[error("{file}, line {line}: `time_s` does not increase; sort the rows and drop repeated ones")]
     Time {
@@ -135,8 +105,8 @@ impl FlightLog {
     /// # Errors
     /// When the `csv` crate fails, which no log makes it do.
     pub fn to_csv(&self, file: &str) -> Result<Vec<u8>, LogError> {
-        let in_file = |source| LogError::File { file: file.into(), source };
-        let in_csv = |source| LogError::Csv { file: file.into(), source };
+        let in_file = |source| TableError::File { file: file.into(), source };
+        let in_csv = |source| TableError::Csv { file: file.into(), source };
         let mut writer = csv::Writer::from_writer(Vec::new());
         let mut header = vec!["time_s".to_owned()];
         for (signal, derivative, unit) in [
@@ -174,7 +144,7 @@ impl FlightLog {
                 .chain(truth.into_iter().flatten());
             writer.write_record(cells.map(|value| value.to_string())).map_err(in_csv)?;
         }
-        writer.into_inner().map_err(|error| in_file(error.into_error()))
+        Ok(writer.into_inner().map_err(|error| in_file(error.into_error()))?)
     }
 
     /// Reads a log and brings it to `rate_hz` rows a second by linear interpolation between its rows.
@@ -182,9 +152,7 @@ impl FlightLog {
     /// # Errors
     /// Names the file, the line and the column of what is wrong.
     pub fn read(path: &Path, rate_hz: f64) -> Result<Self, LogError> {
-        let file = path.display().to_string();
-        let reader = File::open(path).map_err(|source| LogError::File { file: file.clone(), source })?;
-        Self::parse(reader, &file, rate_hz)
+        Self::of_table(Table::open(path)?, rate_hz)
     }
 
     /// [`FlightLog::read`] from any source; `file` is the name in messages.
@@ -192,17 +160,18 @@ impl FlightLog {
     /// # Errors
     /// As [`FlightLog::read`].
     pub fn parse(reader: impl io::Read, file: &str, rate_hz: f64) -> Result<Self, LogError> {
-        let in_csv = |source| LogError::Csv { file: file.into(), source };
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(reader);
-        let header = reader.headers().map_err(in_csv)?.clone();
-        let find = |column: &str| header.iter().position(|name| name == column);
-        let require = |column: &str| find(column).ok_or_else(|| LogError::Column { file: file.into(), column: column.into() });
-        let vector = |signal: &str, derivative: &str, unit: &str| -> Result<[usize; 3], LogError> {
+        Self::of_table(Table::new(reader, file)?, rate_hz)
+    }
+
+    fn of_table<R: io::Read>(mut table: Table<R>, rate_hz: f64) -> Result<Self, LogError> {
+        let file = table.file().to_owned();
+        let require = |column: &str| table.require(column, "`host-sim train --help` lists the columns");
+        let vector = |signal: &str, derivative: &str, unit: &str| -> Result<[usize; 3], TableError> {
             let [x, y, z] = names(signal, derivative, unit);
             Ok([require(&x)?, require(&y)?, require(&z)?])
         };
         let optional = |signal: &str, derivative: &str, unit: &str| {
-            let [x, y, z] = names(signal, derivative, unit).map(|name| find(&name));
+            let [x, y, z] = names(signal, derivative, unit).map(|name| table.find(&name));
             Some([x?, y?, z?])
         };
         let time = require("time_s")?;
@@ -214,55 +183,44 @@ impl FlightLog {
             vector("measured", "", "m")?,
             vector("measured", "v", "m_s")?,
         ];
-        let (acceleration, yaw, truth) = (optional("desired", "a", "m_s2"), find("desired_yaw_rad"), optional("true", "", "m"));
+        let (acceleration, yaw, truth) =
+            (optional("desired", "a", "m_s2"), table.find("desired_yaw_rad"), optional("true", "", "m"));
         let mut rows: Vec<LogRow> = Vec::new();
-        for record in reader.records() {
-            let record = record.map_err(in_csv)?;
-            let line = record.position().map_or(0, csv::Position::line);
-            let cell = |column: usize| {
-                let text = record.get(column).unwrap_or_default();
-                text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| LogError::Cell {
-                    file: file.into(),
-                    line,
-                    column: header.get(column).unwrap_or_default().into(),
-                    found: text.into(),
-                })
-            };
-            let triple = |columns: [usize; 3]| -> Result<[f64; 3], LogError> {
-                Ok([cell(columns[0])?, cell(columns[1])?, cell(columns[2])?])
-            };
+        for row in table.rows() {
+            let cells = row?;
+            let line = cells.line();
             let [position, velocity, reference_position, reference_velocity, measured_position, measured_velocity] = required;
             let row = LogRow {
-                time: cell(time)?,
+                time: cells.number(time)?,
                 desired: Sample {
-                    position: triple(position)?,
-                    velocity: triple(velocity)?,
-                    acceleration: acceleration.map_or(Ok([0.0; 3]), triple)?,
-                    yaw: yaw.map_or(Ok(0.0), cell)?,
+                    position: cells.numbers(position)?,
+                    velocity: cells.numbers(velocity)?,
+                    acceleration: acceleration.map_or(Ok([0.0; 3]), |places| cells.numbers(places))?,
+                    yaw: yaw.map_or(Ok(0.0), |place| cells.number(place))?,
                 },
-                reference_position: triple(reference_position)?,
-                reference_velocity: triple(reference_velocity)?,
-                measured_position: triple(measured_position)?,
-                measured_velocity: triple(measured_velocity)?,
+                reference_position: cells.numbers(reference_position)?,
+                reference_velocity: cells.numbers(reference_velocity)?,
+                measured_position: cells.numbers(measured_position)?,
+                measured_velocity: cells.numbers(measured_velocity)?,
                 measured_body: None,
-                true_position: truth.map(triple).transpose()?,
+                true_position: truth.map(|places| cells.numbers(places)).transpose()?,
             };
             if let Some(previous) = rows.last() {
                 let gap = row.time - previous.time;
                 if gap <= 0.0 {
-                    return Err(LogError::Time { file: file.into(), line });
+                    return Err(LogError::Time { file, line });
                 }
                 if gap > LONGEST_GAP {
-                    return Err(LogError::Gap { file: file.into(), line, gap });
+                    return Err(LogError::Gap { file, line, gap });
                 }
             }
             rows.push(row);
         }
         if rows.len() < FEWEST_ROWS {
-            return Err(LogError::Short { file: file.into(), rows: rows.len(), needed: FEWEST_ROWS });
+            return Err(LogError::Short { file, rows: rows.len(), needed: FEWEST_ROWS });
         }
         let rows = resampled(&rows, rate_hz);
-        Ok(Self { name: file.into(), rate_hz, scored: 0..rows.len(), rows })
+        Ok(Self { name: file, rate_hz, scored: 0..rows.len(), rows })
     }
 }
 

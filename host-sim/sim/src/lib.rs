@@ -15,7 +15,7 @@
 //!
 //! | layer | modules | what they hold |
 //! |---|---|---|
-//! | 1 | `plant`, `trajectory` | the rigid body with its rotors and vehicle files; what is desired at each tick |
+//! | 1 | `plant`, `trajectory`, `columns` | the rigid body with its rotors and vehicle files; what is desired at each tick; tables with named columns |
 //! | 2 | `weather`, `sensors`, `flight_log` | wind and disturbance; noise and delay; what a flight leaves behind, as CSV |
 //! | 3 | `condition` | what a flight meets, by name |
 //! | 4 | `rollout` | closed-loop flights, eight at once |
@@ -32,6 +32,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod columns;
 pub mod condition;
 pub mod flight_log;
 pub mod flights;

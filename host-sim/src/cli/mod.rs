@@ -190,7 +190,10 @@ mod tests {
     #[test]
     fn a_message_says_every_cause_once() {
         let cause = || std::io::Error::other("disk full");
-        let error = impromptu_sim::flight_log::LogError::File { file: "a.csv".into(), source: cause() };
+        let error = impromptu_sim::flight_log::LogError::from(impromptu_sim::columns::TableError::File {
+            file: "a.csv".into(),
+            source: cause(),
+        });
         assert_eq!(message(&anyhow::Error::new(error).context("--log")), "--log: a.csv: disk full");
         assert_eq!(message(&anyhow::Error::new(cause()).context("b.csv")), "b.csv: disk full");
     }

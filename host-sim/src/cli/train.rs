@@ -1,22 +1,16 @@
 //! `host-sim train`: flight logs to a model.
 
 mod columns;
-mod feedback;
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
 use impromptu_flight::flight::Rates;
-use impromptu_model_export::{
-    Description, Precision,
-    description::{LaneDescription, Provenance, Timing},
-    encode,
-};
 use impromptu_sim::{flight_log::FlightLog, flights::Loop};
 use impromptu_training::{
-    AxisGates, Candidates, Judge, Learned, Purpose, Recipe, Rows, best_in_flight, check_gates, derived, describe, learn, monitor,
-    observer::Observer as _, smoothing, supervised::Progress, validated_rms, validation_strokes, write_model_files,
+    AxisGates, LearnSettings, Pipeline, Recipe, Trained, Validation, check_gates, in_words, observer::Observer as _, smoothing,
+    supervised::Progress, write_model_files,
 };
 use serde::Serialize;
 
@@ -70,7 +64,7 @@ fn file_name(text: &str) -> Result<String, String> {
 
 /// What is printed as JSON.
 #[derive(Debug, Serialize)]
-struct Trained {
+struct Summary {
     name: String,
     seed: u64,
     logs: usize,
@@ -106,11 +100,10 @@ struct Origin {
 impl Train {
     pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
         let seed = invocation.configuration.seed();
-        let mut recipe: Recipe = match &self.recipe {
+        let recipe: Recipe = match &self.recipe {
             Some(path) => checked(path).context("--recipe")?,
             None => invocation.configuration.recipe().clone(),
         };
-        (recipe.network.seed, recipe.fine_tuning.seed) = (seed, seed);
         let origin = self.origin(&recipe)?;
         let rate_hz = f64::from(Rates::default().reference_hz());
         let read = |paths: &[PathBuf]| paths.iter().map(|path| FlightLog::read(path, rate_hz)).collect::<Result<Vec<_>, _>>();
@@ -121,52 +114,24 @@ impl Train {
         let folder = invocation.configuration.folder()?;
 
         invocation.console.stage(&format!("training on {} logs", logs.len()));
-        let validation = match &origin.closed_loop {
-            Some(closed_loop) => validation_strokes(&recipe, &recipe.validation_speeds, closed_loop.rate_hz(), seed)?,
-            None => Vec::new(),
-        };
-        let in_flight = origin.closed_loop.as_ref().map(|closed_loop| {
-            let flight_seed = derived(seed, Purpose::Validation);
-            let (recipe, validation) = (&recipe, &validation);
-            move |candidates: Candidates<'_>, rows: &Rows| {
-                Ok(best_in_flight(recipe, closed_loop, validation, flight_seed, candidates, rows)?)
-            }
-        });
-        let judge = in_flight.as_ref().map(|judge| judge as &Judge<'_>);
-        let learned = learn(&recipe, &logs, origin.delay_s, origin.smoothing_s, judge, &mut watched(invocation, &recipe))?;
+        let pipeline = origin.pipeline(&recipe, seed)?;
+        let learned = pipeline.learn(&logs, &mut watched(invocation, &recipe))?;
         invocation.console.finish();
         for log in &learned.broken {
             let error = log.largest_error;
             invocation.console.note(&format!("{}: left out, its loop broke down (largest error {error:.2} m)", log.name));
         }
-        let describe = |lane: Option<&LaneDescription>, remarks: &str| {
-            describe_model(&self.name, &recipe, &origin, &learned, lane, remarks, seed)
-        };
         invocation.console.stage("designing the feedback lane");
         let identification = if dithered.is_empty() { &logs } else { &dithered };
-        let lane = feedback::choose(invocation, &recipe, origin.closed_loop.as_ref(), identification, &validation, &|lane| {
-            encode(&describe(Some(lane), ""), Some(&learned.quantised), Precision::Int8, &learned.rows.calibration)
-        });
-        let (mut remarks, design, refusal) = match &lane {
-            Ok(choice) => (format!("feedback lane: {}", choice.design), Some(choice.design.clone()), None),
-            Err(reason) => (format!("no feedback lane: {reason}"), None, Some(reason.clone())),
+        let trained = pipeline.complete(&learned, identification, &self.name, gates.overridden.as_deref())?;
+        let Trained { lane, description, model } = trained;
+        invocation.console.note(&in_words(&lane));
+        let (design, refusal) = match lane {
+            Ok(choice) => (Some(choice.design), None),
+            Err(reason) => (None, Some(reason.to_string())),
         };
-        invocation.console.note(&remarks);
-        if let Some(overridden) = &gates.overridden {
-            remarks = format!("{remarks}; {overridden}");
-        }
-        let mut description = describe(lane.as_ref().ok().map(|choice| &choice.lane), &remarks);
-        let exported =
-            |description: &Description| encode(description, Some(&learned.quantised), Precision::Int8, &learned.rows.calibration);
-        let mut model = exported(&description)?;
-        // What the guard judges by needs flights that the add-on flew; without a vehicle there are none.
-        if let (Some(closed_loop), Ok(mut monitor)) = (&origin.closed_loop, monitor(&recipe, identification)) {
-            monitor.validated_rms = validated_rms(closed_loop, &validation, &model, derived(seed, Purpose::Validation))?;
-            description.monitor = Some(monitor);
-            model = exported(&description)?;
-        }
         let files = write_model_files(&folder, &self.name, &learned, &description, &model)?;
-        let trained = Trained {
+        let trained = Summary {
             name: self.name,
             seed,
             logs: logs.len(),
@@ -218,6 +183,26 @@ impl Train {
     }
 }
 
+impl Origin {
+    /// The training of these logs: judged in flight if there is a simulated loop.
+    fn pipeline(&self, recipe: &Recipe, seed: u64) -> Result<Pipeline<'_>> {
+        let validation = self
+            .closed_loop
+            .as_ref()
+            .map(|closed_loop| Validation::strokes(recipe, closed_loop, &recipe.validation_speeds, seed));
+        Ok(Pipeline {
+            settings: LearnSettings {
+                measurement_delay_s: self.delay_s,
+                smoothing_s: self.smoothing_s,
+                ..LearnSettings::new(recipe, seed)
+            },
+            template: &self.template,
+            known: self.closed_loop.is_some(),
+            validation: validation.transpose()?,
+        })
+    }
+}
+
 /// Logs in which nothing moves teach nothing: the largest extent of the measured path, m, must be above this.
 const LEAST_EXTENT: f64 = 0.2;
 
@@ -245,29 +230,7 @@ fn watched<'a>(invocation: &'a Invocation, recipe: &Recipe) -> impl FnMut(Progre
     }
 }
 
-/// The description, with what is known of the logs' origin.
-fn describe_model(
-    name: &str,
-    recipe: &Recipe,
-    origin: &Origin,
-    learned: &Learned,
-    lane: Option<&LaneDescription>,
-    remarks: &str,
-    seed: u64,
-) -> Description {
-    let description = describe(recipe, &origin.template, &learned.rows, lane, name, remarks, seed);
-    let provenance = match &origin.closed_loop {
-        Some(_) => description.provenance,
-        None => {
-            let unknown = || "not stated".to_owned();
-            Provenance { vehicle: unknown(), gains: unknown(), condition: unknown(), ..description.provenance }
-        }
-    };
-    let timing = Timing { measurement_delay_s: origin.delay_s as f32, ..description.timing };
-    Description { name: name.into(), provenance, timing, ..description }
-}
-
-fn text(trained: &Trained) -> String {
+fn text(trained: &Summary) -> String {
     let lane = match (&trained.feedback_lane, &trained.refusal) {
         (Some(design), _) => design.clone(),
         (None, reason) => format!("none: {}", reason.as_deref().unwrap_or_default()),

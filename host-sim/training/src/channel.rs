@@ -4,10 +4,13 @@
 //! Fig. 1: u and y of the baseline. Of a flight log the desired position is u: without an add-on it is the reference but for a dither,
 //! which the velocity reference does not share and which here counts as noise.
 
-use std::{fs::File, path::Path};
+use std::path::Path;
 
 use impromptu_diagnosis::{Record, RecordError};
-use impromptu_sim::flight_log::{FlightLog, LogError};
+use impromptu_sim::{
+    columns::{Table, TableError},
+    flight_log::FlightLog,
+};
 
 /// A channel by name.
 #[derive(Clone, Debug)]
@@ -23,21 +26,9 @@ pub struct Channel {
 /// Why a file holds no channel.
 #[derive(Debug, thiserror::Error)]
 pub enum ChannelError {
-    /// The file cannot be read.
+    /// It is no table of numbers with the columns wanted.
     #[error(transparent)]
-    Log(#[from] LogError),
-    /// A column is missing.
-    #[error(
-        "{file}: column `{column}` is missing (there are: {found}); name the columns with --columns TIME,REFERENCE,MEASURED, or see `host-sim diagnose --help`"
-    )]
-    Column {
-        /// The file.
-        file: String,
-        /// The column.
-        column: String,
-        /// The columns found.
-        found: String,
-    },
+    Table(#[from] TableError),
     /// The columns are no record.
     #[error("{file}: {source}")]
     Record {
@@ -47,6 +38,9 @@ pub enum ChannelError {
         source: RecordError,
     },
 }
+
+/// What to do where a column is missing.
+const ADVICE: &str = "name the columns with --columns TIME,REFERENCE,MEASURED, or see `host-sim diagnose --help`";
 
 /// Axes of a flight log.
 pub const AXES: [&str; 3] = ["x", "y", "z"];
@@ -83,12 +77,9 @@ fn fresh(time: &[f64], reference: &[f64], measured: &[f64], age_s: f64) -> Resul
 /// # Errors
 /// Names the file, the line and the column of what is wrong.
 pub fn read(path: &Path, columns: Option<&[String; 3]>, age_s: f64) -> Result<Vec<Channel>, ChannelError> {
-    let file = path.display().to_string();
-    let reader = File::open(path).map_err(|source| LogError::File { file: file.clone(), source })?;
-    let in_csv = |source| LogError::Csv { file: file.clone(), source };
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(reader);
-    let header = reader.headers().map_err(in_csv)?.clone();
-    let has = |column: &str| header.iter().any(|name| name == column);
+    let mut table = Table::open(path)?;
+    let file = table.file().to_owned();
+    let has = |column: &str| table.find(column).is_some();
     let names = |time: &str, reference: &str, measured: &str| [time, reference, measured].map(str::to_owned);
     let wanted: Vec<(String, &'static str, [String; 3])> = match columns {
         Some(columns) => vec![(columns[2].clone(), "units", columns.clone())],
@@ -107,29 +98,16 @@ pub fn read(path: &Path, columns: Option<&[String; 3]>, age_s: f64) -> Result<Ve
             }
         }
     };
-    let find = |column: &String| {
-        header.iter().position(|name| name == column).ok_or_else(|| ChannelError::Column {
-            file: file.clone(),
-            column: column.clone(),
-            found: header.iter().take(12).collect::<Vec<_>>().join(", ") + if header.len() > 12 { ", …" } else { "" },
-        })
-    };
+    let find = |column: &String| table.require(column, ADVICE);
     let places = wanted
         .iter()
         .map(|(_, _, columns)| Ok([find(&columns[0])?, find(&columns[1])?, find(&columns[2])?]))
-        .collect::<Result<Vec<[usize; 3]>, ChannelError>>()?;
+        .collect::<Result<Vec<[usize; 3]>, TableError>>()?;
     let mut values = vec![[const { Vec::<f64>::new() }; 3]; wanted.len()];
-    for record in reader.records() {
-        let record = record.map_err(in_csv)?;
-        for (places, values) in places.iter().zip(&mut values) {
-            for (&place, values) in places.iter().zip(values) {
-                let text = record.get(place).unwrap_or_default();
-                let value = text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| LogError::Cell {
-                    file: file.clone(),
-                    line: record.position().map_or(0, csv::Position::line),
-                    column: header.get(place).unwrap_or_default().into(),
-                    found: text.into(),
-                })?;
+    for row in table.rows() {
+        let row = row?;
+        for (&places, values) in places.iter().zip(&mut values) {
+            for (value, values) in row.numbers(places)?.into_iter().zip(values) {
                 values.push(value);
             }
         }

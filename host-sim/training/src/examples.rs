@@ -9,7 +9,10 @@ use impromptu_firmware::features::{self, Feature, Signals};
 use impromptu_flight::quadrotor::{DESIRED, MEASURED, REFERENCE};
 use impromptu_sim::flight_log::{BODY, FlightLog};
 
-use crate::supervised::{Dataset, DatasetError, RowMatrix};
+use crate::{
+    bypass::Bypass,
+    supervised::{Dataset, DatasetError, RowMatrix},
+};
 
 /// How examples are made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,6 +25,58 @@ pub struct ExampleSettings {
     pub divisor: u16,
     /// Every how many reference ticks a row is taken.
     pub stride: usize,
+}
+
+/// What a network shall answer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Labels {
+    /// Reference minus output, which is added to the desired state: difference learning.
+    #[default]
+    Corrections,
+    /// Whole references.
+    References,
+}
+
+impl Labels {
+    /// What has to go past a network with these labels, as the adapter adds its outputs to the desired state.
+    pub fn bypass(self) -> Option<Bypass> {
+        match self {
+            Self::Corrections => None,
+            Self::References => Some(Bypass::Desired),
+        }
+    }
+
+    /// Rows of features and these labels from `logs`.
+    ///
+    /// # Errors
+    /// If the logs hold no usable row.
+    pub fn examples(
+        self,
+        logs: &[&FlightLog],
+        features: &[Feature],
+        settings: &ExampleSettings,
+    ) -> Result<Dataset, DatasetError> {
+        match self {
+            Self::Corrections => examples(logs, features, settings),
+            // The outputs that corrections are differences to, as inputs for a moment.
+            Self::References => {
+                let features = [features, &Bypass::Desired.features()].concat();
+                whole_references(&examples(logs, &features, settings)?)
+            }
+        }
+    }
+}
+
+/// Rows whose labels are whole references: the last six inputs are the outputs that the labels were differences to.
+fn whole_references(data: &Dataset) -> Result<Dataset, DatasetError> {
+    let inputs = data.inputs().columns() - REFERENCE;
+    let (mut without, mut labels) = (RowMatrix::new(inputs), RowMatrix::new(REFERENCE));
+    for (input, label) in data.inputs().iter().zip(data.labels().iter()) {
+        without.push(&input[..inputs]);
+        let whole: Vec<f32> = label.iter().zip(&input[inputs..]).map(|(label, base)| label + base).collect();
+        labels.push(&whole);
+    }
+    Dataset::new(without, labels)
 }
 
 /// A log as the feature function sees it in training: the output in the place of the desired trajectory.

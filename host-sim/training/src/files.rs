@@ -9,7 +9,10 @@ use impromptu_model_export::{
     description::{ChannelDescription, Signals},
 };
 
-use impromptu_sim::flight_log::{FlightLog, LogError};
+use impromptu_sim::{
+    columns::TableError,
+    flight_log::{FlightLog, LogError},
+};
 
 use crate::learn::Learned;
 
@@ -20,7 +23,7 @@ use crate::learn::Learned;
 pub fn write_log(log: &FlightLog, path: &Path) -> Result<(), LogError> {
     let file = path.display().to_string();
     let bytes = log.to_csv(&file)?;
-    impromptu_model_export::replacement::replace(path, &bytes).map_err(|source| LogError::File { file, source })
+    impromptu_model_export::replacement::replace(path, &bytes).map_err(|source| TableError::File { file, source }.into())
 }
 
 /// Writes network, description, calibration rows and model, each replaced whole and only when all bytes are made.
@@ -34,7 +37,7 @@ pub fn write_model_files(
     description: &Description,
     model: &[u8],
 ) -> Result<Vec<PathBuf>> {
-    let network = learned.quantised.to_bytes().context("network")?;
+    let network = learned.exported.to_bytes().context("network")?;
     let rows = rows(learned, description)?;
     let description = description.to_json();
     let contents: [(&str, &[u8]); 4] =

@@ -17,63 +17,16 @@ use impromptu_model_export::{
 use impromptu_sim::{
     flight_log::FlightLog,
     flights::{FlightsError, Loop},
-    rollout::{Dither, RolloutError},
-    trajectory::Trajectory,
+    rollout::Dither,
 };
 use rayon::prelude::*;
 
 use crate::{
-    feedback_design::{AxisLog, DesignRefusal, DesignSettings, IdentificationData, LaneDesign, design},
+    feedback_design::{AxisLog, DesignSettings, IdentificationData, LaneDesign, design},
+    lane_choice::{LaneChoice, LaneRefusal},
     recipe::{LaneRecipe, Recipe},
+    validation::Validation,
 };
-
-/// Why a model is written without a feedback lane.
-#[derive(Debug, thiserror::Error)]
-pub enum LaneRefusal {
-    /// The identification or every design was refused.
-    #[error("{axis}: {reason}")]
-    Design {
-        /// Axis that was refused.
-        axis: &'static str,
-        /// Why.
-        reason: DesignRefusal,
-    },
-    /// No design passed the validation flights.
-    #[error("of {designs} designs none passed the validation flights; the best one's worst flight was {worst:.1} % ({case})")]
-    Flights {
-        /// Designs that were flown.
-        designs: usize,
-        /// Reduction of the worst flight of the best design, per cent.
-        worst: f64,
-        /// The case in which that was.
-        case: String,
-    },
-    /// Flights could not be flown.
-    #[error(transparent)]
-    Rollout(#[from] FlightsError),
-    /// A candidate could not be encoded.
-    #[error(transparent)]
-    Export(#[from] ExportError),
-}
-
-impl From<RolloutError> for LaneRefusal {
-    fn from(error: RolloutError) -> Self {
-        Self::Rollout(error.into())
-    }
-}
-
-/// The lane that was chosen.
-#[derive(Clone, Debug)]
-pub struct LaneChoice {
-    /// What is stored.
-    pub lane: LaneDescription,
-    /// The design in words.
-    pub design: String,
-    /// Score: weighted mean over the cases of 90 % of the (geometric) average and 10 % of the worst reduction, per cent.
-    pub score: f64,
-    /// Worst reduction over all validation flights, per cent.
-    pub worst: f64,
-}
 
 /// One design, ready to be flown.
 struct Candidate {
@@ -257,16 +210,15 @@ struct Score {
 /// All designs of a recipe from dithered logs, and how each flew over the validation trajectories in every case.
 fn flown(
     recipe: &LaneRecipe,
-    closed_loop: &Loop,
+    validation: &Validation<'_>,
     logs: &[FlightLog],
-    validation: &[Trajectory],
-    seed: u64,
     encode: &(dyn Fn(&LaneDescription) -> Result<Vec<u8>, ExportError> + Sync),
 ) -> Result<(Vec<Candidate>, Vec<Score>), LaneRefusal> {
     let candidates = candidates(recipe, logs)?;
     let cases = &CASES;
     // What a lane does by itself is judged, not what the guard makes of it.
-    let closed_loop = &closed_loop.unguarded();
+    let Validation { closed_loop, trajectories: validation, seed } = validation;
+    let (closed_loop, seed) = (&closed_loop.unguarded(), *seed);
     let loops: Vec<Loop> = cases.iter().map(|case| closed_loop.delayed(case.delay_s)).collect();
     let baselines: Vec<Vec<f64>> =
         loops.iter().map(|closed_loop| closed_loop.errors(validation, None, 1.0, seed)).collect::<Result<_, _>>()?;
@@ -324,20 +276,18 @@ fn worst_to_answer_for(baseline: &[f64], network_alone: &[f64], errors: &[f64]) 
 const LOSS_AGAINST_NETWORK: f64 = 1.0;
 const LOSS_SHARE: f64 = 0.2;
 
-/// Designs lanes from dithered `logs` and chooses one by flights over the `validation` trajectories. `encode` makes a
+/// Designs lanes from dithered `logs` and chooses one by `validation` flights. `encode` makes a
 /// model file with a lane; the network lane flies too.
 ///
 /// # Errors
 /// With the reason why there is no lane.
 pub fn choose_lane(
     recipe: &Recipe,
-    closed_loop: &Loop,
+    validation: &Validation<'_>,
     logs: &[FlightLog],
-    validation: &[Trajectory],
-    seed: u64,
     encode: &(dyn Fn(&LaneDescription) -> Result<Vec<u8>, ExportError> + Sync),
 ) -> Result<LaneChoice, LaneRefusal> {
-    let (candidates, scores) = flown(&recipe.lane, closed_loop, logs, validation, seed, encode)?;
+    let (candidates, scores) = flown(&recipe.lane, validation, logs, encode)?;
     let admissible = |score: &Score| score.worst >= 0.0;
     if let Some(choice) = best(&candidates, &scores, &admissible) {
         return Ok(choice);
@@ -356,13 +306,11 @@ pub fn choose_lane(
 /// If there is no design at all.
 pub fn strongest_lane(
     recipe: &LaneRecipe,
-    closed_loop: &Loop,
+    validation: &Validation<'_>,
     logs: &[FlightLog],
-    validation: &[Trajectory],
-    seed: u64,
     encode: &(dyn Fn(&LaneDescription) -> Result<Vec<u8>, ExportError> + Sync),
 ) -> Result<LaneChoice, LaneRefusal> {
-    let (candidates, scores) = flown(recipe, closed_loop, logs, validation, seed, encode)?;
+    let (candidates, scores) = flown(recipe, validation, logs, encode)?;
     best(&candidates, &scores, &|_| true).ok_or(LaneRefusal::Flights {
         designs: 0,
         worst: f64::NEG_INFINITY,

@@ -1,12 +1,17 @@
 //! From logs to networks: ridge regression, the network that refines it, the same fine-tuned for int8.
+//!
+//! *in* settings, logs of the baseline; *out* networks, and what a description needs of their rows; *never* a row of a log that
+//! is held out; *source* Zhou 2017, section III-A.
 
 use impromptu_flight::quadrotor::REFERENCE;
-use impromptu_model_export::{Batch, FloatNetwork, Precision};
+use impromptu_model_export::{Batch, Description, ExportError, FloatNetwork, Precision, encode};
 use impromptu_sim::flight_log::FlightLog;
 
 use crate::{
     breakdown::{Breakdown, sound},
-    examples::{ExampleSettings, examples},
+    bypass::Bypass,
+    examples::{ExampleSettings, Labels},
+    hold_out::split,
     recipe::Recipe,
     supervised::{Dataset, DatasetError, Progress, Ridge, RidgeError, TrainingError, TrainingSettings, fine_tune, train},
 };
@@ -34,19 +39,89 @@ pub enum LearnError {
     OneLog,
 }
 
+/// What is learned from logs, and how.
+#[derive(Clone, Debug)]
+pub struct LearnSettings {
+    /// Features, networks and how they are trained, with the seed in them.
+    pub recipe: Recipe,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Corrections or whole references.
+    pub labels: Labels,
+    /// Number format of the model file: with float nothing is fine-tuned.
+    pub precision: Precision,
+    /// Whether logs in which the loop broke down are used as well.
+    pub broken: bool,
+    /// Age of the logged measurements, s.
+    pub measurement_delay_s: f64,
+    /// Zero-phase smoothing of the logs, s.
+    pub smoothing_s: f64,
+}
+
+impl LearnSettings {
+    /// Corrections for an int8 model, from sound logs without noise of measurements without delay.
+    pub fn new(recipe: &Recipe, seed: u64) -> Self {
+        let mut recipe = recipe.clone();
+        (recipe.network.seed, recipe.fine_tuning.seed) = (seed, seed);
+        Self {
+            recipe,
+            seed,
+            labels: Labels::Corrections,
+            precision: Precision::Int8,
+            broken: false,
+            measurement_delay_s: 0.0,
+            smoothing_s: 0.0,
+        }
+    }
+}
+
 /// What was learned from a set of logs.
 #[derive(Clone, Debug)]
 pub struct Learned {
+    /// Corrections or whole references.
+    pub labels: Labels,
     /// Ridge regression: a network that is all skip.
     pub ridge: FloatNetwork,
     /// Skip and layers, f32.
     pub network: FloatNetwork,
-    /// The same after fine-tuning with int8 weights imitated.
-    pub quantised: FloatNetwork,
+    /// What the model file holds: for int8 the network after fine-tuning with its weights imitated, or the network itself.
+    pub exported: FloatNetwork,
+    /// Number format of the model file.
+    pub precision: Precision,
     /// What a description needs of the training rows.
     pub rows: Rows,
+    /// Coefficient of determination R² of the network over the position labels of the logs held out.
+    pub determination: f64,
     /// Logs that were left out.
     pub broken: Vec<Breakdown>,
+}
+
+impl Learned {
+    /// The model file of a description.
+    ///
+    /// # Errors
+    /// If it cannot be encoded.
+    pub fn encode(&self, description: &Description) -> Result<Vec<u8>, ExportError> {
+        self.encode_as(description, &self.exported, self.precision, self.labels.bypass())
+    }
+
+    /// The same of another network on these rows, or with other inputs past it.
+    ///
+    /// # Errors
+    /// If it cannot be encoded.
+    pub fn encode_as(
+        &self,
+        description: &Description,
+        network: &FloatNetwork,
+        precision: Precision,
+        bypass: Option<Bypass>,
+    ) -> Result<Vec<u8>, ExportError> {
+        let Some(bypass) = bypass else {
+            return encode(description, Some(network), precision, &self.rows.calibration);
+        };
+        let (description, network, calibration) = bypass.added(description, network, &self.rows.calibration);
+        encode(&description, Some(&network), precision, &calibration)
+    }
 }
 
 /// Rows of calibration that are kept.
@@ -94,31 +169,29 @@ impl Rows {
     }
 }
 
-/// Learns from logs of the baseline; every fourth log is kept to decide when a training has been long enough. `judge` chooses between
-/// the recipe's candidates, which should be done in flight; without it the kept logs decide by rows.
+/// Learns from logs of the baseline, some of which are held out to decide when a training has been long enough. `judge` chooses
+/// between the recipe's candidates, which should be done in flight; without it the logs held out decide by rows.
 ///
 /// # Errors
 /// If the logs hold too little or the training fails.
 pub fn learn(
-    recipe: &Recipe,
+    settings: &LearnSettings,
     logs: &[FlightLog],
-    measurement_delay_s: f64,
-    smoothing_s: f64,
     judge: Option<&Judge<'_>>,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Learned, LearnError> {
-    let (logs, broken) = sound(logs);
+    let recipe = &settings.recipe;
+    let (logs, broken) = if settings.broken { (logs.iter().collect(), Vec::new()) } else { sound(logs) };
     if logs.len() < 2 {
         return Err(LearnError::OneLog);
     }
-    let settings = ExampleSettings { measurement_delay_s, smoothing_s, divisor: recipe.divisor, stride: recipe.stride };
-    let features = recipe.features();
-    let held = |index: usize| index % 4 == 3 || (logs.len() < 4 && index + 1 == logs.len());
-    let pick = |wanted: bool| -> Vec<&FlightLog> {
-        logs.iter().enumerate().filter(|(index, _)| held(*index) == wanted).map(|(_, log)| *log).collect()
+    let LearnSettings { labels, precision, measurement_delay_s, smoothing_s, .. } = *settings;
+    let examples = |logs: &[&FlightLog]| {
+        let settings = ExampleSettings { measurement_delay_s, smoothing_s, divisor: recipe.divisor, stride: recipe.stride };
+        labels.examples(logs, &recipe.features(), &settings)
     };
-    let training = examples(&pick(false), &features, &settings)?;
-    let validation = examples(&pick(true), &features, &settings)?;
+    let (training, held_out) = split(&logs);
+    let (training, validation) = (examples(&training)?, examples(&held_out)?);
     let rows = Rows::of(&training);
     let ridge = Ridge::fit(&training, recipe.ridge_penalty)?.to_network();
     let mut candidates = Vec::new();
@@ -137,11 +210,34 @@ pub fn learn(
         networks.into_iter().nth(index).ok_or(LearnError::NoCandidate)
     };
     let network = choose(candidates, Precision::Float)?;
-    // The exporter rounds with the error of one weight made good by the others, which training cannot imitate: whether the fine-tuning
-    // helps is seen in flight.
-    let tuned = fine_tune(&network, &recipe.fine_tuning, &training, &validation, progress)?.network;
-    let quantised = choose(vec![network.clone(), tuned], Precision::Int8)?;
-    Ok(Learned { ridge, network, quantised, rows, broken })
+    // The exporter rounds with the error of one weight made good by the others, which training cannot imitate: whether the
+    // fine-tuning helps is seen in flight.
+    let exported = match precision {
+        Precision::Float => network.clone(),
+        Precision::Int8 | Precision::Int16 => {
+            let tuned = fine_tune(&network, &recipe.fine_tuning, &training, &validation, progress)?.network;
+            choose(vec![network.clone(), tuned], precision)?
+        }
+    };
+    let determination = determination(&network, &validation);
+    Ok(Learned { labels, ridge, network, exported, precision, rows, determination, broken })
+}
+
+/// R² over the position labels.
+fn determination(network: &FloatNetwork, data: &Dataset) -> f64 {
+    let (mut left, mut sum, mut squares) = ([0.0; 3], [0.0; 3], [0.0; 3]);
+    for (input, label) in data.inputs().iter().zip(data.labels().iter()) {
+        let found = network.evaluate(input);
+        for axis in 0..3 {
+            let label = f64::from(label[axis]);
+            left[axis] += (f64::from(found[axis]) - label).powi(2);
+            sum[axis] += label;
+            squares[axis] += label * label;
+        }
+    }
+    let rows = data.rows() as f64;
+    let total: f64 = (0..3).map(|axis| squares[axis] - sum[axis] * sum[axis] / rows).sum();
+    1.0 - left.iter().sum::<f64>() / total
 }
 
 /// The candidate with the least squared error on rows that it has not seen, each output by its own scale.

@@ -11,42 +11,57 @@
 //!
 //! At the bottom are methods that know no recipe: supervised training from rows, identification and design of a feedback lane from signals,
 //! channels for the diagnosis. Above them is the recipe, which decides how a model comes about, and the single steps: leave out flights
-//! that broke down, learn, describe, choose a lane, measure what the monitor needs. [`build()`] does them all.
+//! that broke down, hold some out, learn, describe, choose a lane, measure what the monitor needs. A [`Pipeline`] does them all, whatever the
+//! logs come from; [`build()`] flies the logs first.
 //!
 //! | layer | modules | what they hold |
 //! |---|---|---|
-//! | 1 | `supervised`, `feedback_design`, `channel`, `breakdown`, `observer` | rows to networks; identification and design of the lane; channels of logs; flights that teach nothing; who watches |
+//! | 1 | `supervised`, `feedback_design`, `channel`, `breakdown`, `hold_out`, `bypass`, `purpose`, `observer` | rows to networks; identification and design of the lane; channels of logs; flights that teach nothing; logs held out; inputs past a network; seeds; who watches |
 //! | 2 | `examples`, `gates`, `recipe` | rows of features from logs; the diagnosis before a training; everything that decides, as data |
 //! | 3 | `learn` | logs to networks |
-//! | 4 | `error`, `files`, `models` | why there are no models; files written whole; descriptions and model files |
-//! | 5 | `lane` | the feedback lane, chosen in flight |
-//! | 6 | `monitor` | what the guard is told of the loop |
-//! | 7 | `build` | from a loop to its models |
+//! | 4 | `error`, `files`, `models` | why there are no models; files written whole; descriptions |
+//! | 5 | `validation`, `lane_choice` | flights that judge; what comes of the choice of a lane |
+//! | 6 | `lane` | the feedback lane, chosen in flight |
+//! | 7 | `monitor` | what the guard is told of the loop |
+//! | 8 | `pipeline` | from logs to a model file |
+//! | 9 | `build` | from a loop to its models |
 
 pub mod breakdown;
 pub mod build;
+pub mod bypass;
 pub mod channel;
 pub mod error;
 pub mod examples;
 pub mod feedback_design;
 pub mod files;
 pub mod gates;
+pub mod hold_out;
 pub mod lane;
+pub mod lane_choice;
 pub mod learn;
 pub mod models;
 pub mod monitor;
 pub mod observer;
+pub mod pipeline;
+pub mod purpose;
 pub mod recipe;
 pub mod supervised;
+pub mod validation;
 
 pub use breakdown::{Breakdown, largest_sound_error};
-pub use build::{Built, Purpose, best_in_flight, build, derived, smoothing, training_logs, validation_strokes};
+pub use build::{Built, ModelSet, build, training_logs};
+pub use bypass::Bypass;
 pub use error::BuildError;
+pub use examples::Labels;
 pub use files::{write_log, write_model_files};
 pub use gates::{AxisGates, check_gates};
-pub use lane::{LaneChoice, LaneRefusal, choose_lane, dithered_logs, lanes, strongest_lane};
-pub use learn::{Candidates, Judge, LearnError, Learned, Rows, learn};
-pub use models::{FromFlights, ModelSet, describe, feedforward};
+pub use lane::{choose_lane, dithered_logs, lanes, strongest_lane};
+pub use lane_choice::{LaneChoice, LaneRefusal, in_words};
+pub use learn::{Candidates, Judge, LearnError, LearnSettings, Learned, Rows, learn};
+pub use models::{describe, feedforward};
 pub use monitor::{monitor, validated_rms};
 pub use observer::Observer;
+pub use pipeline::{Pipeline, Trained, smoothing};
+pub use purpose::{Purpose, derived};
 pub use recipe::{FlightSet, LaneRecipe, Recipe, Signal};
+pub use validation::{Validation, best_in_flight};

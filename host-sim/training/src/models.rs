@@ -1,4 +1,7 @@
-//! Model files of an experiment.
+//! What models say of themselves, and the model that needs no training.
+//!
+//! *in* a recipe, a loop, rows; *out* a [`Description`]; *never* limits far above the corrections of the training flights;
+//! *source* differential flatness for the feed-forward.
 
 use impromptu_firmware::{
     features::{Feature, Relative, Source},
@@ -10,76 +13,17 @@ use impromptu_flight::{
 };
 use impromptu_model_export::{
     Description, ExportError, FloatNetwork, Precision,
-    description::{LaneDescription, MonitorDescription, Provenance, Signals, Timing},
+    description::{LaneDescription, Provenance, Signals, Timing},
     encode,
 };
 use impromptu_sim::flights::Loop;
 
-use crate::{
-    learn::{Learned, Rows},
-    recipe::Recipe,
-};
-
-/// The models that an experiment compares, as the bytes of model files.
-#[derive(Clone, Debug)]
-pub struct ModelSet {
-    /// Flatness feed-forward.
-    pub feedforward: Vec<u8>,
-    /// Ridge regression.
-    pub ridge: Vec<u8>,
-    /// Network, f32.
-    pub float: Vec<u8>,
-    /// Network, int8.
-    pub int8: Vec<u8>,
-    /// What the int8 file says of itself.
-    pub description: Description,
-}
-
-/// What a model has from dithered logs and validation flights.
-#[derive(Clone, Debug, Default)]
-pub struct FromFlights {
-    /// Feedback lane.
-    pub lane: Option<LaneDescription>,
-    /// What the guard judges the lanes by.
-    pub monitor: Option<MonitorDescription>,
-}
+use crate::{learn::Rows, recipe::Recipe};
 
 /// Limits above the largest correction in training.
 const LIMIT_FACTOR: f32 = 1.5;
 /// A correction may cross its whole range in this many reference ticks.
 const SLEW_TICKS: f32 = 5.0;
-
-impl ModelSet {
-    /// Encodes all models of a loop, each with the feedback lane and the monitor if there are any; the feed-forward has its own.
-    ///
-    /// # Errors
-    /// If a model cannot be encoded.
-    pub fn new(
-        recipe: &Recipe,
-        closed_loop: &Loop,
-        learned: &Learned,
-        own: &FromFlights,
-        of_feedforward: &FromFlights,
-        remarks: &str,
-        seed: u64,
-    ) -> Result<Self, ExportError> {
-        let describe = |name: &str, from: &FromFlights| {
-            let description = describe(recipe, closed_loop, &learned.rows, from.lane.as_ref(), name, remarks, seed);
-            Description { monitor: from.monitor.clone(), ..description }
-        };
-        let feedforward = feedforward(&closed_loop.settings, describe("feedforward", of_feedforward))?;
-        let make = |name: &str, network: &FloatNetwork, precision| {
-            encode(&describe(name, own), Some(network), precision, &learned.rows.calibration)
-        };
-        Ok(Self {
-            feedforward,
-            ridge: make("ridge", &learned.ridge, Precision::Float)?,
-            float: make("net_f32", &learned.network, Precision::Float)?,
-            int8: make("net_int8", &learned.quantised, Precision::Int8)?,
-            description: describe("net_int8", own),
-        })
-    }
-}
 
 /// Largest correction and slew of each reference channel.
 fn outputs(rows: &Rows, lane: Option<&LaneDescription>) -> Vec<Output> {
@@ -104,7 +48,7 @@ pub fn describe(
     seed: u64,
 ) -> Description {
     Description {
-        name: format!("{}-{}-{}-{name}", closed_loop.vehicle.name, closed_loop.gains, closed_loop.condition.name),
+        name: name.into(),
         provenance: Provenance {
             vehicle: closed_loop.vehicle.name.clone(),
             gains: closed_loop.gains.clone(),

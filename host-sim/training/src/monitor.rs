@@ -1,24 +1,22 @@
 //! What the firmware's guard is told of a loop: its response to corrections, and what the add-on promises.
 //!
-//! *in* logs with dither, and validation flights with the add-on; *out* a [`MonitorDescription`]; *never* a validated_rms from flights that the
-//! guard has interfered with.
+//! *in* logs with dither, and validation flights with the add-on; *out* a [`MonitorDescription`]; *never* a validated RMS from
+//! flights that the guard has interfered with.
 
 use impromptu_firmware::{adapter::Lanes, model::Model};
 use impromptu_model_export::{
     ExportError,
     description::{MonitorAxisDescription, MonitorDescription},
 };
-use impromptu_sim::{
-    flight_log::FlightLog,
-    flights::{FlightsError, Loop},
-    trajectory::Trajectory,
-};
+use impromptu_sim::{flight_log::FlightLog, flights::FlightsError};
 
 use crate::{
     error::BuildError,
     feedback_design::{IdentificationData, response::box_responses},
-    lane::{LaneRefusal, identification},
+    lane::identification,
+    lane_choice::LaneRefusal,
     recipe::Recipe,
+    validation::Validation,
 };
 
 /// Reference ticks in a monitor tick: 50 ms at 100 Hz.
@@ -26,7 +24,8 @@ const DIVISOR: usize = 5;
 /// Monitor ticks that a response lasts: 1.6 s, after which the loops of both vehicles are at rest.
 const TAPS: usize = 32;
 
-/// The responses of x, y and z to the corrections of position and velocity, from logs with dither. The validated_rms is still zero.
+/// The responses of x, y and z to the corrections of position and velocity, from logs with dither. The validated RMS is still
+/// zero.
 ///
 /// # Errors
 /// If the logs cannot tell what a correction does.
@@ -51,14 +50,15 @@ pub fn monitor(recipe: &Recipe, logs: &[FlightLog]) -> Result<MonitorDescription
     Ok(MonitorDescription { divisor: DIVISOR as u16, validated_rms: 0.0, axes: axes.collect() })
 }
 
-/// Median over the validation flights of the RMS error with all lanes of a model, m: a few flights in which motors saturate do not
-/// loosen it.
+/// Median over the validation flights of the RMS error with all lanes of a model, m: a few flights in which motors saturate do
+/// not loosen it.
 ///
 /// # Errors
 /// If the model is refused or does not fit the flight stack.
-pub fn validated_rms(closed_loop: &Loop, validation: &[Trajectory], model: &[u8], seed: u64) -> Result<f32, BuildError> {
+pub fn validated_rms(validation: &Validation<'_>, model: &[u8]) -> Result<f32, BuildError> {
     let model = Model::from_bytes(model).map_err(ExportError::Refused)?;
-    let errors = closed_loop.unguarded().errors(validation, Some((&model, Lanes::BOTH)), 1.0, seed);
+    let Validation { closed_loop, trajectories, seed } = validation;
+    let errors = closed_loop.unguarded().errors(trajectories, Some((&model, Lanes::BOTH)), 1.0, *seed);
     let mut errors = errors.map_err(FlightsError::from)?;
     errors.sort_by(f64::total_cmp);
     Ok(errors.get(errors.len() / 2).copied().unwrap_or(0.0) as f32)

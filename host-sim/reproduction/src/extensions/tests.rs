@@ -1,3 +1,5 @@
+use std::sync::LazyLock;
+
 use crate::{
     checks::unanswered,
     siso::extensions::flights::{Flight, PERIOD},
@@ -6,13 +8,19 @@ use impromptu_diagnosis::{Gate, Record, Settings as Diagnosing, assess};
 
 use super::*;
 
-#[test]
-fn the_extended_add_on_keeps_its_bounds_on_every_signal() {
+/// One quick run for all.
+pub(crate) static QUICK: LazyLock<Study> = LazyLock::new(|| {
     let mut study = Study::new("t", "host-sim study lti", 1);
     nonlinear::add(&mut study, &TRAINING(10, 40), 2, 1);
     regions::add(&mut study, &TRAINING(8, 40), 2, 1);
     preview::add(&mut study, 2, 1).unwrap();
-    assert_eq!(unanswered(&study, ROWS), Vec::<u8>::new());
+    study
+});
+
+#[test]
+fn the_extended_add_on_keeps_its_bounds_on_every_signal() {
+    let study = &*QUICK;
+    assert_eq!(unanswered(study, ROWS), Vec::<u8>::new());
     assert!(study.findings.iter().all(|finding| finding.meets() != Some(false)), "{:#?}", study.findings);
     let longest = study.value("preview_40_s_remaining").unwrap();
     assert!(longest < study.value("preview_5_s_remaining").unwrap());

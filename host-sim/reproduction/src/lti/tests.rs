@@ -8,7 +8,7 @@ use crate::{
 use super::{Settings, Study, run};
 
 /// One quick run for all.
-static QUICK: LazyLock<Study> = LazyLock::new(|| run(&quick()).unwrap());
+pub(crate) static QUICK: LazyLock<Study> = LazyLock::new(|| run(&quick()).unwrap());
 
 /// Few rows and steps: what is asserted here does not need the last digits.
 fn quick() -> Settings {

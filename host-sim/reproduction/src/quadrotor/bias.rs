@@ -17,7 +17,7 @@ use impromptu_sim::{
     rollout::{FlightPlan, fly_on},
     trajectory::{Sample, Trajectory, tones::smooth_step},
 };
-use impromptu_training::{Purpose, derived};
+use impromptu_training::{Labels, Purpose, derived};
 use rayon::prelude::*;
 
 use super::{
@@ -104,7 +104,7 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> 
     let learned: Vec<Vec<Flown>> = lists()
         .into_par_iter()
         .map(|(name, words, list)| {
-            let learned = learn(&ground.recipe(list), &ground.closed_loop, &logs, true)?;
+            let learned = learn(&ground.recipe(list), &ground.closed_loop, &logs, Labels::Corrections)?;
             let network = fly(ground, &steps, Some(&learned.network_file(&ground.closed_loop)?))?;
             let ridge = fly(ground, &steps, Some(&learned.ridge_file(&ground.closed_loop)?))?;
             Ok(vec![(name.to_owned(), words.to_owned(), network), (format!("{name}_ridge"), format!("{words}, ridge"), ridge)])

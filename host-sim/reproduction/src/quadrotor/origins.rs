@@ -4,6 +4,7 @@
 //! another reference point: in the training data y_d and y are the same; *source* Zhou 2017, Insight 3.
 
 use impromptu_report::study::{Finding, Study};
+use impromptu_training::Labels;
 use rayon::prelude::*;
 
 use super::{
@@ -25,8 +26,8 @@ pub(super) fn run(ground: &Ground<'_>, twelve_inputs: &Learned, study: &mut Stud
         .par_iter()
         .map(|&(inputs, base)| {
             let list = twelve(inputs);
-            let network = twelve_inputs.file(closed_loop, &twelve_inputs.network, &list, base)?;
-            let ridge = twelve_inputs.file(closed_loop, &twelve_inputs.ridge, &list, base)?;
+            let network = twelve_inputs.file(closed_loop, &twelve_inputs.maps.network, &list, base)?;
+            let ridge = twelve_inputs.file(closed_loop, &twelve_inputs.maps.ridge, &list, base)?;
             Ok([
                 ground.test.reduction(closed_loop, &network)?,
                 ground.validation.reduction(closed_loop, &network)?,
@@ -47,8 +48,8 @@ pub(super) fn run(ground: &Ground<'_>, twelve_inputs: &Learned, study: &mut Stud
             );
         }
     }
-    let whole = learn(&ground.recipe(twelve(Origin::Nothing)), closed_loop, &ground.logs, false)?;
-    for (map, network) in [("network", &whole.network), ("ridge", &whole.ridge)] {
+    let whole = learn(&ground.recipe(twelve(Origin::Nothing)), closed_loop, &ground.logs, Labels::References)?;
+    for (map, network) in [("network", &whole.maps.network), ("ridge", &whole.maps.ridge)] {
         let file = whole.file(closed_loop, network, &twelve(Origin::Nothing), Origin::Nothing)?;
         let (test, validation) = (ground.test.reduction(closed_loop, &file)?, ground.validation.reduction(closed_loop, &file)?);
         report(

@@ -9,7 +9,7 @@ use impromptu_report::{
     Axis, Curve, Figure,
     study::{Finding, Study},
 };
-use impromptu_training::Recipe;
+use impromptu_training::{Labels, Recipe};
 use rayon::prelude::*;
 
 use super::{
@@ -61,7 +61,7 @@ fn sub_rates(crazyflie: &Crazyflie, study: &mut Study) -> anyhow::Result<()> {
         .par_iter()
         .map(|&divisor| {
             let recipe = windowed(&crazyflie.recipe, divisor, WINDOW[1]);
-            let learned = learn(&recipe, closed_loop, &crazyflie.clean_logs, true)?;
+            let learned = learn(&recipe, closed_loop, &crazyflie.clean_logs, Labels::Corrections)?;
             let fly = |interpolation| {
                 let file = learned.at(interpolation).network_file(closed_loop)?;
                 crazyflie.clean_course.reduction(closed_loop, &file)
@@ -98,7 +98,7 @@ fn previews(crazyflie: &Crazyflie, study: &mut Study) -> anyhow::Result<()> {
         .map(|&preview| {
             let fly = |closed_loop, logs, course: &super::addon::Course| {
                 let recipe = windowed(&crazyflie.recipe, 10, preview);
-                let learned = learn(&Recipe { network: crazyflie.linear(), ..recipe }, closed_loop, logs, true)?;
+                let learned = learn(&Recipe { network: crazyflie.linear(), ..recipe }, closed_loop, logs, Labels::Corrections)?;
                 course.reduction(closed_loop, &learned.ridge_file(closed_loop)?)
             };
             Ok([
@@ -135,7 +135,7 @@ fn steps_and_seconds(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<(
     let fly = |divisor: u16, degrees: [i16; 3]| {
         let recipe = Recipe { divisor, ..ground.recipe(with_degrees(degrees, Origin::Measured)) };
         let recipe = Recipe { network: super::crazyflie::linear(&recipe.network), ..recipe };
-        let learned = learn(&recipe, closed_loop, &ground.logs, true)?;
+        let learned = learn(&recipe, closed_loop, &ground.logs, Labels::Corrections)?;
         Ok::<_, anyhow::Error>(ground.validation.reduction(closed_loop, &learned.ridge_file(closed_loop)?)?.0.max(-1e6))
     };
     let found: Vec<[f64; 2]> = TICKS

@@ -8,7 +8,7 @@ use impromptu_report::{
     study::{Finding, Study},
 };
 use impromptu_sim::trajectory::{Motion, growing_tones, single_tone};
-use impromptu_training::{FlightSet, Purpose, Signal, derived};
+use impromptu_training::{FlightSet, Labels, Purpose, Signal, derived};
 use rayon::prelude::*;
 
 use super::{
@@ -58,17 +58,17 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> 
         .into_par_iter()
         .map(|(name, words, motions)| {
             let logs = closed_loop.collect(&motions, None, first)?;
-            let learned = learn(&ground.recipe(twelve(Origin::Measured)), closed_loop, &logs, true)?;
+            let learned = learn(&ground.recipe(twelve(Origin::Measured)), closed_loop, &logs, Labels::Corrections)?;
             let fly = |course: &Course, network, origin| {
                 course.reduction(closed_loop, &learned.file(closed_loop, network, &twelve(origin), Origin::Desired)?)
             };
             let flown = [
-                fly(&ground.test, &learned.network, Origin::Measured)?,
-                fly(&ground.test, &learned.network, Origin::Desired)?,
-                fly(&ground.test, &learned.ridge, Origin::Measured)?,
-                fly(&ground.test, &learned.ridge, Origin::Desired)?,
+                fly(&ground.test, &learned.maps.network, Origin::Measured)?,
+                fly(&ground.test, &learned.maps.network, Origin::Desired)?,
+                fly(&ground.test, &learned.maps.ridge, Origin::Measured)?,
+                fly(&ground.test, &learned.maps.ridge, Origin::Desired)?,
             ];
-            Ok(Flown { name, words, determination: learned.determination, reductions: flown })
+            Ok(Flown { name, words, determination: learned.maps.determination, reductions: flown })
         })
         .collect::<anyhow::Result<_>>()?;
     let kinds = ["network_y", "network_yd", "ridge_y", "ridge_yd"];
@@ -120,12 +120,12 @@ pub(super) fn crazyflie(ground: &Ground<'_>, crazyflie: &Crazyflie, study: &mut 
         .into_par_iter()
         .map(|(name, words, motions)| {
             let logs = closed_loop.collect(&motions, None, first)?;
-            let learned = learn(&crazyflie.recipe, closed_loop, &logs, true)?;
+            let learned = learn(&crazyflie.recipe, closed_loop, &logs, Labels::Corrections)?;
             let fly = |file: Vec<u8>| crazyflie.lab_course.reduction(closed_loop, &file);
             Ok(Flown {
                 name,
                 words,
-                determination: learned.determination,
+                determination: learned.maps.determination,
                 reductions: [fly(learned.ridge_file(closed_loop)?)?, fly(learned.network_file(closed_loop)?)?],
             })
         })

@@ -8,7 +8,7 @@ use impromptu_report::{
     Axis, Curve, Figure,
     study::{Finding, Study},
 };
-use impromptu_training::{Recipe, supervised::TrainingSettings};
+use impromptu_training::{Labels, Recipe, supervised::TrainingSettings};
 use rayon::prelude::*;
 
 use super::{addon::learn, crazyflie::Crazyflie};
@@ -63,7 +63,7 @@ pub(super) fn run(crazyflie: &Crazyflie, study: &mut Study) -> anyhow::Result<()
             let recipe = Recipe { network, ..crazyflie.recipe.clone() };
             let mut flown = Vec::new();
             for (closed_loop, logs, courses) in loops {
-                let learned = learn(&recipe, closed_loop, logs, true)?;
+                let learned = learn(&recipe, closed_loop, logs, Labels::Corrections)?;
                 let file =
                     if hidden.is_empty() { learned.ridge_file(closed_loop)? } else { learned.network_file(closed_loop)? };
                 for course in courses {

@@ -42,9 +42,9 @@ pub(super) fn predecessor(ground: &Ground<'_>, networks: &Networks, study: &mut 
         Ok(())
     };
     fly("flatness", "flatness feed-forward", &networks.twelve.feedforward_file(closed_loop)?)?;
-    fly("ridge_12", "ridge, 12 inputs", &networks.twelve_file(closed_loop, &networks.twelve.ridge)?)?;
+    fly("ridge_12", "ridge, 12 inputs", &networks.twelve_file(closed_loop, &networks.twelve.maps.ridge)?)?;
     fly("network_36", "network, 36 inputs", &networks.thirty_six.network_file(closed_loop)?)?;
-    fly("network_12", "network, 12 inputs", &networks.twelve_file(closed_loop, &networks.twelve.network)?)?;
+    fly("network_12", "network, 12 inputs", &networks.twelve_file(closed_loop, &networks.twelve.maps.network)?)?;
     report(
         study,
         section,

@@ -9,6 +9,7 @@ use impromptu_report::{
     study::{Asked, Finding, Study},
 };
 use impromptu_sim::{flight_log::FlightLog, flights::Loop};
+use impromptu_training::Labels;
 use rayon::prelude::*;
 
 use super::{
@@ -44,7 +45,7 @@ fn best_origins(ground: &Ground<'_>, learned: &Learned) -> anyhow::Result<(Origi
     let mut best = (f64::NEG_INFINITY, (Origin::Desired, Origin::Desired));
     for inputs in [Origin::Desired, Origin::Measured] {
         for base in [Origin::Desired, Origin::Measured] {
-            let file = learned.file(&ground.closed_loop, &learned.network, &twelve(inputs), base)?;
+            let file = learned.file(&ground.closed_loop, &learned.maps.network, &twelve(inputs), base)?;
             let (mean, _) = ground.validation.reduction(&ground.closed_loop, &file)?;
             if mean > best.0 {
                 best = (mean, (inputs, base));
@@ -60,16 +61,16 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<Netw
     let lists = [("12", twelve(Origin::Measured)), ("36", thirty_six(Origin::Measured))];
     let learned: Vec<Learned> = lists
         .par_iter()
-        .map(|(_, list)| learn(&ground.recipe(list.clone()), closed_loop, &ground.logs, true))
+        .map(|(_, list)| learn(&ground.recipe(list.clone()), closed_loop, &ground.logs, Labels::Corrections))
         .collect::<anyhow::Result<_>>()?;
     let mut learned = learned.into_iter();
     let (Some(twelve), Some(thirty_six)) = (learned.next(), learned.next()) else { anyhow::bail!("two lists, two networks") };
     let networks = Networks { origins: best_origins(ground, &twelve)?, twelve, thirty_six };
     let files = [
-        [&networks.twelve.network, &networks.twelve.ridge].map(|map| networks.twelve_file(closed_loop, map)),
+        [&networks.twelve.maps.network, &networks.twelve.maps.ridge].map(|map| networks.twelve_file(closed_loop, map)),
         [networks.thirty_six.network_file(closed_loop), networks.thirty_six.ridge_file(closed_loop)].map(|file| Ok(file?)),
     ];
-    let determinations = [networks.twelve.determination, networks.thirty_six.determination];
+    let determinations = [networks.twelve.maps.determination, networks.thirty_six.maps.determination];
     let baseline = ground.test.logs(closed_loop, None)?;
     let mut logs: Vec<Vec<FlightLog>> = Vec::new();
     for ((((name, _), [file, ridge]), determination), (paper, paper_mean)) in

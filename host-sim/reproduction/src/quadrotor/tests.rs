@@ -6,7 +6,7 @@ use super::*;
 use crate::checks::{assert_readable, unanswered};
 
 /// One quick run for all.
-static QUICK: LazyLock<Study> = LazyLock::new(|| run(&QuadrotorSettings::quick(), "quick", &|_| {}).unwrap());
+pub(crate) static QUICK: LazyLock<Study> = LazyLock::new(|| run(&QuadrotorSettings::quick(), "quick", &|_| {}).unwrap());
 
 fn value(name: &str) -> f64 {
     QUICK.value(name).unwrap_or_else(|| panic!("no number is named `{name}`"))

@@ -8,7 +8,7 @@ use impromptu_firmware::{
     adapter::Lanes,
     model::{Margins, Model},
 };
-use impromptu_model_export::{Description, ExportError, Precision, encode};
+use impromptu_model_export::{Description, ExportError};
 use impromptu_sim::{
     flights::{Loop, reduction},
     trajectory::Trajectory,
@@ -70,7 +70,7 @@ pub fn sweep(
         };
         let margins = lane.margins;
         let description = Description { feedback_lane: Some(lane), monitor: None, ..built.models.description.clone() };
-        let bytes = encode(&description, Some(&built.learned.quantised), Precision::Int8, &built.learned.rows.calibration)?;
+        let bytes = built.learned.encode(&description)?;
         let model = Model::from_bytes(&bytes).map_err(ExportError::Refused)?;
         let mut reductions = [(0.0, 0.0); DELAYS.len()];
         for ((closed_loop, baseline), found) in loops.iter().zip(&baselines).zip(&mut reductions) {

@@ -7,6 +7,7 @@
 //! What it is worth: the error with an add-on is a model's, nothing was flown. The model misses the measured flight by [`Prediction::misfit`]; an
 //! improvement that leaves less error than that is not shown. [`Prediction::cautious`] adds the misfit to the predicted error.
 
+use impromptu_sim::columns::{Table, TableError};
 use rayon::prelude::*;
 
 use crate::siso::{
@@ -16,6 +17,8 @@ use crate::siso::{
 
 /// Seconds between samples of the logs.
 pub const PERIOD: f64 = 0.04;
+/// What to do where a column is missing.
+const ADVICE: &str = "a log needs px, py, sp_ctrltarget_x and sp_ctrltarget_y in m, sampled every 40 ms";
 /// Left out at the start (the loop comes from somewhere) and at the end (preview beyond the log), s.
 const MARGIN: f64 = 2.0;
 /// The window's span round now, and the distance of its samples, in samples.
@@ -36,24 +39,11 @@ pub struct Flight {
 }
 
 /// Why a log cannot be read.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum FlightError {
-    /// A column is not there.
-    #[error("{name} has no column `{column}`; it needs px, py, sp_ctrltarget_x and sp_ctrltarget_y in m, sampled every 40 ms")]
-    Column {
-        /// Log.
-        name: String,
-        /// Column.
-        column: &'static str,
-    },
-    /// A row is cut or is no number.
-    #[error("line {line} of {name} is not a row of finite numbers")]
-    Row {
-        /// Log.
-        name: String,
-        /// Line, from 1.
-        line: usize,
-    },
+    /// It is no table of numbers with the columns needed.
+    #[error(transparent)]
+    Table(#[from] TableError),
     /// Nothing to learn from.
     #[error("{0} families are too few: one is predicted from the others; give logs of at least three")]
     Families(usize),
@@ -65,19 +55,13 @@ impl Flight {
     /// # Errors
     /// If a column is missing or a number is none.
     pub fn parse(name: &str, text: &str) -> Result<Self, FlightError> {
-        let mut lines = text.lines();
-        let header: Vec<&str> = lines.next().unwrap_or_default().split(',').map(str::trim).collect();
-        let place = |column: &'static str| {
-            header.iter().position(|found| *found == column).ok_or_else(|| FlightError::Column { name: name.into(), column })
-        };
+        let mut table = Table::new(text.as_bytes(), name)?;
+        let place = |column| table.require(column, ADVICE);
         let places = [place("sp_ctrltarget_x")?, place("sp_ctrltarget_y")?, place("px")?, place("py")?];
         let mut columns: [Vec<f64>; 4] = Default::default();
-        for (index, line) in lines.enumerate().filter(|line| !line.1.trim().is_empty()) {
-            let fields: Vec<&str> = line.split(',').collect();
-            for (column, place) in columns.iter_mut().zip(places) {
-                let number =
-                    fields.get(place).and_then(|field| field.trim().parse().ok()).filter(|value: &f64| value.is_finite());
-                column.push(number.ok_or_else(|| FlightError::Row { name: name.into(), line: index + 2 })?);
+        for row in table.rows() {
+            for (column, value) in columns.iter_mut().zip(row?.numbers(places)?) {
+                column.push(value);
             }
         }
         let [rx, ry, px, py] = columns;
@@ -247,7 +231,7 @@ mod tests {
         let flights = ["B1_a_rep1", "B1_a_rep2", "B2_b_rep1", "B3_c_rep1"].iter().zip(1..).map(|(name, seed)| flight(name, seed));
         let flights: Vec<Flight> = flights.collect();
         assert_eq!(flights[0].family(), "B1_a");
-        assert_eq!(predict(&flights[..2]), Err(FlightError::Families(1)));
+        assert!(matches!(predict(&flights[..2]), Err(FlightError::Families(1))));
         for prediction in predict(&flights).unwrap() {
             assert!(prediction.misfit < 0.02 * prediction.measured, "{prediction:?}");
             assert!(prediction.window < 0.5 * prediction.shift && prediction.shift < 0.6 * prediction.repeated, "{prediction:?}");
@@ -261,9 +245,11 @@ mod tests {
         copy.position[0][3] += 1e-3;
         assert_eq!(distinct(vec![one, copy]).len(), 2);
         let text = "t,px,py,sp_ctrltarget_x,sp_ctrltarget_y\n0.0,1,2,3,4\n0.04,1,nan,3,4\n";
-        assert_eq!(Flight::parse("l", text), Err(FlightError::Row { name: "l".into(), line: 3 }));
+        let refused = Flight::parse("l", text).unwrap_err().to_string();
+        assert!(refused.starts_with("l, line 3: `py` is `nan`"), "{refused}");
         let log = Flight::parse("l", "px,sp_ctrltarget_y,py,sp_ctrltarget_x\n1,2,3,4\n").unwrap();
         assert_eq!((log.position, log.reference), ([vec![1.0], vec![3.0]], [vec![4.0], vec![2.0]]));
-        assert!(matches!(Flight::parse("l", "px\n"), Err(FlightError::Column { .. })));
+        let refused = Flight::parse("l", "px\n").unwrap_err().to_string();
+        assert!(refused.starts_with("l: column `sp_ctrltarget_x` is missing (there are: px)"), "{refused}");
     }
 }

@@ -1,0 +1,192 @@
+//! Tables of numbers with named columns, as CSV: what every log is read from.
+//!
+//! *in* CSV with a header, the columns in any order, spaces round the cells ignored; *out* rows of finite numbers; *never* a
+//! refusal that does not name the file and, where there are any, line and column; *source* RFC 4180.
+
+use std::{fs::File, io, path::Path};
+
+/// Why a table cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum TableError {
+    /// The file cannot be opened, read or written.
+    #[error("{file}: {source}")]
+    File {
+        /// The file.
+        file: String,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// Not CSV.
+    #[error("{file}: {source}")]
+    Csv {
+        /// The file.
+        file: String,
+        /// What is wrong, with the line.
+        source: csv::Error,
+    },
+    /// A column is missing.
+    #[error("{file}: column `{column}` is missing (there are: {found}); {advice}")]
+    Column {
+        /// The file.
+        file: String,
+        /// The column.
+        column: String,
+        /// The first columns that there are.
+        found: String,
+        /// What to do.
+        advice: &'static str,
+    },
+    /// A cell is not a finite number.
+    #[error("{file}, line {line}: `{column}` is `{found}`, not a finite number; drop or repair the row")]
+    Cell {
+        /// The file.
+        file: String,
+        /// The line, from 1.
+        line: u64,
+        /// The column.
+        column: String,
+        /// The text.
+        found: String,
+    },
+}
+
+/// Columns that a refusal names.
+const NAMED: usize = 12;
+
+/// A table whose header has been read.
+pub struct Table<R> {
+    file: String,
+    header: csv::StringRecord,
+    reader: csv::Reader<R>,
+}
+
+impl Table<File> {
+    /// Opens a file.
+    ///
+    /// # Errors
+    /// If it cannot be opened, or its header cannot be read.
+    pub fn open(path: &Path) -> Result<Self, TableError> {
+        let file = path.display().to_string();
+        match File::open(path) {
+            Ok(reader) => Self::new(reader, &file),
+            Err(source) => Err(TableError::File { file, source }),
+        }
+    }
+}
+
+impl<R: io::Read> Table<R> {
+    /// Reads the header from any source; `file` is the name in messages.
+    ///
+    /// # Errors
+    /// If the header cannot be read.
+    pub fn new(reader: R, file: &str) -> Result<Self, TableError> {
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(reader);
+        let header = reader.headers().map_err(|source| TableError::Csv { file: file.into(), source })?.clone();
+        Ok(Self { file: file.into(), header, reader })
+    }
+
+    /// Name in messages.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// Place of a column, if there is one of that name.
+    pub fn find(&self, column: &str) -> Option<usize> {
+        self.header.iter().position(|name| name == column)
+    }
+
+    /// Place of a column; `advice` is what somebody shall do who has none.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn require(&self, column: &str, advice: &'static str) -> Result<usize, TableError> {
+        self.find(column).ok_or_else(|| {
+            let found = self.header.iter().take(NAMED).collect::<Vec<_>>().join(", ");
+            let more = if self.header.len() > NAMED { ", …" } else { "" };
+            TableError::Column { file: self.file.clone(), column: column.into(), found: found + more, advice }
+        })
+    }
+
+    /// The rows, one after another; blank lines are none.
+    pub fn rows(&mut self) -> impl Iterator<Item = Result<Row<'_>, TableError>> {
+        let Self { file, header, reader } = self;
+        let (file, header) = (file.as_str(), &*header);
+        reader.records().map(move |record| {
+            let record = record.map_err(|source| TableError::Csv { file: file.into(), source })?;
+            Ok(Row { file, header, record })
+        })
+    }
+}
+
+/// A row.
+pub struct Row<'a> {
+    file: &'a str,
+    header: &'a csv::StringRecord,
+    record: csv::StringRecord,
+}
+
+impl Row<'_> {
+    /// Line in the file, from 1.
+    pub fn line(&self) -> u64 {
+        self.record.position().map_or(0, csv::Position::line)
+    }
+
+    /// The finite number at the place of a column.
+    ///
+    /// # Errors
+    /// If it is none.
+    pub fn number(&self, place: usize) -> Result<f64, TableError> {
+        let text = self.record.get(place).unwrap_or_default();
+        text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| TableError::Cell {
+            file: self.file.into(),
+            line: self.line(),
+            column: self.header.get(place).unwrap_or_default().into(),
+            found: text.into(),
+        })
+    }
+
+    /// The finite numbers at the places of several columns.
+    ///
+    /// # Errors
+    /// Names the first that is none.
+    pub fn numbers<const N: usize>(&self, places: [usize; N]) -> Result<[f64; N], TableError> {
+        let mut numbers = [0.0; N];
+        for (number, place) in numbers.iter_mut().zip(places) {
+            *number = self.number(place)?;
+        }
+        Ok(numbers)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pairs(text: &str) -> Result<Vec<(u64, [f64; 2])>, TableError> {
+        let mut table = Table::new(text.as_bytes(), "t.csv")?;
+        let places = [table.require("b", "give b")?, table.require("a", "give a")?];
+        table.rows().map(|row| row.and_then(|row| Ok((row.line(), row.numbers(places)?)))).collect()
+    }
+
+    #[test]
+    fn columns_are_found_by_name_in_any_order() {
+        assert_eq!(pairs("a, more ,b\n 1,x,2\n3,y, -4e-1 \n\n").unwrap(), [(2, [2.0, 1.0]), (3, [-0.4, 3.0])]);
+        assert_eq!(pairs("b,a\n").unwrap(), []);
+    }
+
+    #[test]
+    fn a_refusal_names_file_line_and_column_and_says_what_to_do() {
+        let refusal = |text: &str| pairs(text).expect_err("refused").to_string();
+        assert_eq!(refusal("time,b\n1,2\n"), "t.csv: column `a` is missing (there are: time, b); give a");
+        for cell in ["", "north", "nan", "inf"] {
+            let text = format!("a,b\n1,2\n3,{cell}\n");
+            assert_eq!(refusal(&text), format!("t.csv, line 3: `b` is `{cell}`, not a finite number; drop or repair the row"));
+        }
+        let ragged = refusal("a,b\n1,2\n3\n");
+        assert!(ragged.starts_with("t.csv: ") && ragged.contains("line: 3"), "{ragged}");
+        let wide = refusal(&format!("{}\n", (0..20).map(|index| format!("c{index}")).collect::<Vec<_>>().join(",")));
+        assert!(wide.contains("c11, …)") && !wide.contains("c12"), "{wide}");
+        let absent = Table::open(Path::new("no/such.csv")).err().expect("absent").to_string();
+        assert!(absent.starts_with("no/such.csv: "), "{absent}");
+    }
+}
