@@ -1,7 +1,7 @@
 //! Golden texts: results that must not change unnoticed, in `tests/golden/`.
 //!
-//! Instruction counts, bytes and stacks belong to one compiler, which `rust-toolchain.toml` names and which each text names again: with
-//! another one they are compared as well, and differ.
+//! Instruction counts, bytes and stacks belong to one compiler, which `rust-toolchain.toml` names and which each text names
+//! again: with another one they are compared as well, and differ.
 
 use std::{
     env, fs,

@@ -19,7 +19,7 @@ use impromptu_sim::{
     rollout::FlightPlan,
     trajectory::{Trajectory, strokes},
 };
-use impromptu_training::{LaneRecipe, Recipe, dithered_logs, strongest_lane};
+use impromptu_training::{LaneRecipe, Recipe, Validation, dithered_logs, strongest_lane};
 
 /// The bar of the issue.
 const BAR: f64 = 1.5;
@@ -125,6 +125,7 @@ fn an_aggressive_feedback_lane_in_a_late_loop_is_handed_over_in_time() {
     let late = closed_loop.delayed(0.02);
     let trajectories = strokes(SEED, 12, 1.0, closed_loop.rate_hz()).expect("strokes");
     let one = strokes(SEED, 1, 1.0, closed_loop.rate_hz()).expect("a stroke");
+    let validation = Validation { closed_loop: &closed_loop, trajectories: one, seed: SEED };
     let recipe = Recipe::default().lane;
     let logs = dithered_logs(&recipe, &closed_loop, SEED).expect("logs");
     let (description, network) = parts("crazyflie", "rough");
@@ -140,7 +141,7 @@ fn an_aggressive_feedback_lane_in_a_late_loop_is_handed_over_in_time() {
             ..recipe.clone()
         };
         let with = |lane: &LaneDescription| Description { feedback_lane: Some(lane.clone()), ..description.clone() };
-        let lane = strongest_lane(&wild, &closed_loop, &logs, &one, SEED, &|lane| model(&with(lane))).expect("a lane");
+        let lane = strongest_lane(&wild, &validation, &logs, &|lane| model(&with(lane))).expect("a lane");
         let mut open = with(&lane.lane);
         open.outputs.iter_mut().for_each(|output| (output.limit, output.slew) = (output.limit + 0.5, output.slew + 0.1));
         let bytes = model(&open).expect("a model");

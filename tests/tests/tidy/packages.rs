@@ -65,6 +65,13 @@ fn copies_of_golden_models_are_the_golden_ones() {
 }
 
 #[test]
+fn the_copy_of_the_golden_table_is_the_golden_one() {
+    let read = |place: &str| fs::read_to_string(workspace().join(place)).unwrap();
+    let (copy, original) = ("host-sim/reproduction/data/mcu.txt", "tests/golden/mcu.txt");
+    assert!(read(copy) == read(original), "run: cp {original} {copy}");
+}
+
+#[test]
 fn manifests_say_what_a_registry_shows() {
     for folder in published() {
         let manifest: toml::Table = toml::from_str(&fs::read_to_string(folder.join("Cargo.toml")).unwrap()).unwrap();

@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn estimated_cycles_are_those_of_the_golden_table() {
-        let table = include_str!("../../../../tests/golden/mcu.txt");
+        let table = include_str!("../../data/mcu.txt");
         let golden = |net: &str| -> f64 {
             let row =
                 table.lines().map(|line| line.split_whitespace().collect::<Vec<_>>()).find(|row| row.starts_with(&[net, "int8"]));

@@ -17,7 +17,7 @@ mod report;
 mod settings;
 pub mod spread;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use anyhow::Context as _;
 use impromptu_firmware::model::Model;
