@@ -1,8 +1,9 @@
 //! Dense layers with int8 or int16 weights, codes of at most 16 bits and 32-bit accumulators.
 //!
-//! A row's accumulator is Σ weight × code + bias, the weights in the units of [`super::kernel`]. A code never exceeds the limit that the
-//! card gives for the layer's inputs, and validation proves for every row that then no accumulator leaves 32 bits. A hidden layer turns
-//! it into a code with one rounded multiplication, (accumulator × multiplier + 2³¹) / 2³²; the last one into f32 with a scale.
+//! A row's accumulator is Σ weight × code + bias, the weights in the units of [`super::kernel`]. A code never exceeds the limit
+//! that the card gives for the layer's inputs, and validation proves for every row that then no accumulator leaves 32 bits. A
+//! hidden layer turns it into a code with one rounded multiplication, (accumulator × multiplier + 2³¹) / 2³²; the last one into
+//! f32 with a scale.
 
 use super::{
     Activation, INPUT_PADDING, ROWS,

@@ -1,39 +1,48 @@
 //! Dense layers over a packed stream of weights: what the kernels compute, and which of them runs.
 //!
-//! *in* one layer's stream and the words of its inputs; *out* the words of its outputs; *never* reads beyond the slices, panics or
-//! gives other bits on another machine; *source* the packed orders below.
+//! *in* one layer's stream and the words of its inputs; *out* the words of its outputs; *never* reads beyond the slices, panics
+//! or gives other bits on another machine; *source* the packed orders below.
 //!
-//! On a Cortex-M4F [`mod@self`] runs hand-written assembly, elsewhere (and for a stream that is not aligned to words) the
-//! [portable twin](portable). Both give the same bits. The choice is made by the target that is compiled for, in `build.rs`.
+//! A Cortex-M core with the DSP extension runs hand-written assembly for integer layers, one with an FPU for float layers; every
+//! other machine (and each for a stream that is not aligned to words) runs the [portable twin](portable). Both give the same
+//! bits. The choice is made by the target that is compiled for, in `build.rs`:
+//!
+//! | target | cores | integers | floats |
+//! |---|---|---|---|
+//! | `thumbv7em-none-eabihf` | M4F, M7 | assembly | assembly |
+//! | `thumbv7em-none-eabi` | M4, M7 | assembly | twin |
+//! | `thumbv8m.main-none-eabihf` | M33, M35P, M55, M85 | assembly with the Cargo feature `dsp` | assembly |
+//! | `thumbv8m.main-none-eabi` | the same | assembly with the Cargo feature `dsp` | twin |
+//! | others | M0, M3, M23, RISC-V, WebAssembly, x86-64, … | twin | twin |
 //!
 //! # Integer stream
 //! For each block of [`ROWS`] outputs: eight i32 biases, the weights, and eight words of requantisation (i32 multipliers; f32 row
 //! scales in the last layer, which the kernel skips). Inputs are 16-bit codes, two to a word, the first one in the low half.
 //! - [`Width::Int16`]: for each pair of inputs eight words, one a row: the halves are the weights of the pair, low half first.
 //! - [`Width::Int8`]: for each pair of inputs four words of four bytes, one for two rows. The even row's weights are the word's
-//!   halves, the odd row's are the halves of the same word moved up by eight bits. So a byte is one row's weight *and* the fraction
-//!   of another's; in units of 1/256 of an int8 step, with bytes b₀…b₃ (b as signed, u as unsigned),
+//!   halves, the odd row's are the halves of the same word moved up by eight bits. So a byte is one row's weight *and* the
+//!   fraction of another's; in units of 1/256 of an int8 step, with bytes b₀…b₃ (b as signed, u as unsigned),
 //!
 //!   | | first input | second input |
 //!   |---|--:|--:|
 //!   | even row | 256 b₁ + u₀ | 256 b₃ + u₂ |
 //!   | odd row | 256 b₀ | 256 b₂ + u₁ |
 //!
-//!   These are the exact weights on every machine. Who packs chooses b₀, then b₁, b₂, b₃, and so has each of them within half a step.
+//!   These are the exact weights on every machine. Who packs chooses b₀, then b₁, b₂, b₃, and so has each of them within half a
+//!   step.
 //!
 //! An accumulator is bias + Σ weight × code, modulo 2³²; the loader proves that the sum itself never leaves 32 bits.
 //!
 //! # Float stream
-//! Up to six outputs are one block of six rows. More are padded to a multiple of 4, at least 8, and divided into blocks of twelve rows and at
-//! most two of eight at the end ([`float_blocks`]). For each block: its f32 biases, then for each input the block's f32 weights. An accumulator starts at the bias and
-//! adds weight × input in the inputs' order, each product and each sum rounded.
+//! Up to six outputs are one block of six rows. More are padded to a multiple of 4, at least 8, and divided into blocks of twelve
+//! rows and at most two of eight at the end ([`float_blocks`]). For each block: its f32 biases, then for each input the block's
+//! f32 weights. An accumulator starts at the bias and adds weight × input in the inputs' order, each product and each sum
+//! rounded.
 //!
 //! The number of inputs is padded with zero weights: to a multiple of 4 (integers) or of 2 (floats).
 
-#[cfg(cortex_m4)]
-#[path = "cortex_m4.rs"]
-mod cortex_m4;
-#[path = "portable.rs"]
+#[cfg(any(dsp, fpu))]
+mod cortex_m;
 pub mod portable;
 
 use super::ROWS;
@@ -94,8 +103,13 @@ impl Finish {
     }
 }
 
-/// Which kernel [`Integer`] and [`Float`] run on an aligned stream.
-pub const NAME: &str = if cfg!(cortex_m4) { "Cortex-M4 assembly" } else { "portable" };
+/// Which instructions [`Integer`] and [`Float`] run on an aligned stream.
+pub const NAME: &str = match (cfg!(dsp), cfg!(fpu)) {
+    (true, true) => "DSP and FPU",
+    (true, false) => "DSP",
+    (false, true) => "FPU",
+    (false, false) => "portable",
+};
 
 /// An integer layer, checked once: an evaluation then checks two lengths alone.
 #[derive(Clone, Debug)]
@@ -105,23 +119,23 @@ pub struct Integer<'a> {
     finish: Finish,
     inputs: usize,
     outputs: usize,
-    #[cfg(cortex_m4)]
-    assembly: Option<cortex_m4::Integer<'a>>,
+    #[cfg(dsp)]
+    assembly: Option<cortex_m::Integer<'a>>,
 }
 
 impl<'a> Integer<'a> {
     /// A layer of `inputs` words (an even number) and the blocks in `stream`.
     pub fn new(width: Width, stream: &'a [[u8; 4]], inputs: usize, finish: Finish) -> Self {
         let outputs = stream.len() / width.block(inputs) * finish.words();
-        #[cfg(cortex_m4)]
-        let assembly = cortex_m4::Integer::new(width, stream, inputs, finish);
+        #[cfg(dsp)]
+        let assembly = cortex_m::Integer::new(width, stream, inputs, finish);
         Self {
             stream,
             width,
             finish,
             inputs,
             outputs,
-            #[cfg(cortex_m4)]
+            #[cfg(dsp)]
             assembly,
         }
     }
@@ -131,11 +145,11 @@ impl<'a> Integer<'a> {
         self.stream
     }
 
-    /// Reads the first words of `inputs`, which are pairs of codes, and writes the first ones of `outputs`, [`Finish::words`] for each
-    /// block; does nothing if either are too few.
+    /// Reads the first words of `inputs`, which are pairs of codes, and writes the first ones of `outputs`, [`Finish::words`] for
+    /// each block; does nothing if either are too few.
     #[inline(always)]
     pub fn run(&self, inputs: &[u32], outputs: &mut [u32]) {
-        #[cfg(cortex_m4)]
+        #[cfg(dsp)]
         if let Some(assembly) = &self.assembly {
             assembly.run(inputs, outputs);
             return;
@@ -174,29 +188,30 @@ pub struct Float<'a> {
     relu: bool,
     inputs: u16,
     outputs: u16,
-    #[cfg(cortex_m4)]
-    assembly: Option<cortex_m4::Float<'a>>,
+    #[cfg(fpu)]
+    assembly: Option<cortex_m::Float<'a>>,
 }
 
 impl<'a> Float<'a> {
     /// A layer of `inputs` words (an even number) and `outputs` rows, those of [`float_rows`].
     pub fn new(stream: &'a [[u8; 4]], inputs: u16, relu: bool, outputs: u16) -> Self {
-        #[cfg(cortex_m4)]
-        let assembly = cortex_m4::Float::new(stream, inputs.into(), relu, outputs.into());
+        #[cfg(fpu)]
+        let assembly = cortex_m::Float::new(stream, inputs.into(), relu, outputs.into());
         Self {
             stream,
             relu,
             inputs,
             outputs,
-            #[cfg(cortex_m4)]
+            #[cfg(fpu)]
             assembly,
         }
     }
 
-    /// Reads the bits of f32 in the first words of `inputs` and writes the first ones of `outputs`; does nothing if either are too few.
+    /// Reads the bits of f32 in the first words of `inputs` and writes the first ones of `outputs`; does nothing if either are
+    /// too few.
     #[inline(always)]
     pub fn run(&self, inputs: &[u32], outputs: &mut [u32]) {
-        #[cfg(cortex_m4)]
+        #[cfg(fpu)]
         if let Some(assembly) = &self.assembly {
             assembly.run(inputs, outputs);
             return;
@@ -210,7 +225,7 @@ impl<'a> Float<'a> {
 /// The [`tanh`](super::tanh()) of each f32.
 #[inline]
 pub fn tanh(words: &mut [u32]) {
-    #[cfg(cortex_m4)]
-    let words = cortex_m4::tanh(words);
+    #[cfg(fpu)]
+    let words = cortex_m::tanh(words);
     portable::tanh(words);
 }
