@@ -8,7 +8,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Ok(());
     }
     let out = env::var("OUT_DIR")?;
-    let memory = Path::new(&env::var("CARGO_MANIFEST_DIR")?).join("../../memory.x");
+    let memory = Path::new(&env::var("CARGO_MANIFEST_DIR")?).join("../../firmware/board/memory/stm32f405.x");
     println!("cargo::rerun-if-changed={}", memory.display());
     fs::copy(&memory, Path::new(&out).join("memory.x")).map_err(|error| format!("cannot copy {}: {error}", memory.display()))?;
     println!("cargo::rustc-link-search={out}");

@@ -1,5 +1,5 @@
 //! What the promises need to be tested: the emulated microcontroller, its cycle model, proofs on its binaries,
-//! C programs, golden texts, bytes for the decoder and the link. The promises themselves are in `tests/`.
+//! C programs, other cores, golden texts, bytes for the decoder and the link. The promises themselves are in `tests/`.
 
 pub mod board;
 pub mod c;
@@ -8,5 +8,6 @@ pub mod elf;
 pub mod golden;
 pub mod link;
 pub mod mcu;
+pub mod twins;
 
 pub use impromptu_host_sim::emulator;

@@ -1,7 +1,7 @@
 //! Models in the flash of a binary that is not running yet, as an uploader would leave them.
 //!
 //! *in* an ELF file with a segment for the slots, and what each slot shall hold; *out* the ELF file that an emulator loads; *never* a byte
-//! outside of that segment; *source* ELF-32; `firmware/board/src/slots.rs` and `memory.x` for the segment.
+//! outside of that segment; *source* ELF-32; `firmware/board/src/slots.rs`, `firmware/board/memory` for the segment.
 
 use anyhow::{Context as _, Result, ensure};
 use impromptu_firmware::{

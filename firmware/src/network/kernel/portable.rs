@@ -1,6 +1,6 @@
 //! The kernels in safe Rust, for every machine: the definition of the bits that the assembly must give.
 
-use super::{Finish, Width, float_blocks};
+use super::stream::{Finish, Width, float_blocks};
 use crate::network::{self, ROWS, tanh_code};
 
 /// Upper bits of accumulator × multiplier + 2³¹.

@@ -8,7 +8,7 @@
 use core::arch::naked_asm;
 
 use super::{aligned, each, floats};
-use crate::network::kernel::float_blocks;
+use crate::network::kernel::stream::float_blocks;
 
 /// A layer's part of the float kernels' arguments, in the order in which they load it.
 #[derive(Clone, Debug)]

@@ -12,7 +12,10 @@ use super::{
     aligned, each,
     frame::{extension, frame},
 };
-use crate::network::kernel::{Finish, Width, portable};
+use crate::network::kernel::{
+    portable,
+    stream::{Finish, Width},
+};
 
 /// Chunks of four inputs in the unrolled integer loops.
 const UNROLLED: usize = 5;
