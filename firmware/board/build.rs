@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rustc-link-arg-bins=--nmagic");
     // A fault on the emulated board shall end it. A jump to 0 (not a Thumb address) inside the handler locks the core up: QEMU
     // then prints the registers and aborts. A handler in Rust would have to be an `unsafe fn`.
-    for bin in ["emulated", "netduinoplus2", "kernels"] {
+    for bin in ["emulated", "netduinoplus2"] {
         println!("cargo::rustc-link-arg-bin={bin}=--defsym=HardFault=0");
     }
     // On the real board it resets, as this handler does, which can be written without unsafe code.

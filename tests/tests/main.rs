@@ -9,7 +9,7 @@
 //! - [`emulator`]: the emulator is found, fails loudly, and counts repeatably;
 //! - [`mcu`]: what kernels cost on the microcontroller, beside other engines, with a golden table;
 //! - [`image`]: what is flashed is within its budget, leaves the models alone, and starts behind a boot loader;
-//! - [`kernels`]: the network kernels in assembly give the bits of their portable twin;
+//! - [`kernels`]: layers, networks and flights give the same bits on every core and in WebAssembly;
 //! - [`link`]: any bytes on the link are refused or messages, never a panic;
 //! - [`processor`]: control is never late, whatever the network takes; the processor's share; late inferences;
 //! - [`pil`]: the flashed binary flies the plant, bit for bit, through good lines and bad ones;

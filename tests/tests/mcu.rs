@@ -72,8 +72,23 @@ fn the_kernels_keep_their_promises() {
     assert!(broken.is_empty(), "{broken:#?}");
 }
 
-/// Zeros and inputs far out of range take what typical inputs take, to the cycle; with tanh within what the flash lines of its
-/// table make, which other values read.
+/// Cores with the DSP extension take the instructions of the M4 and 2 % more at most.
+#[test]
+fn int8_takes_the_same_on_every_core_with_the_dsp_extension() {
+    let instructions = |core: &str| {
+        let found = RESULTS.cores.iter().find(|row| row.core == core && row.kernel == "int8");
+        found.unwrap_or_else(|| panic!("there is a row for {core}")).instructions
+    };
+    let most = 1.02 * row("int8", ANCHOR).instructions.min(instructions("M4F")) as f64;
+    for core in ["M7", "M33"] {
+        assert!(instructions(core) as f64 <= most, "{core}: {} of {most}", instructions(core));
+    }
+    // A core without it takes the twin.
+    assert!(instructions("M3") > 3 * instructions("M4F"));
+}
+
+/// Zeros and inputs far out of range take what typical inputs take, to the cycle; with tanh within what the flash lines of its table
+/// make, which other values read.
 #[test]
 fn the_worst_case_of_int8_is_the_typical_case() {
     for row in RESULTS.rows.iter().filter(|row| row.kernel == "int8") {

@@ -18,6 +18,7 @@
 mod float;
 mod integer;
 pub mod kernel;
+mod requantisation;
 mod scratch;
 mod shape;
 mod tanh;
@@ -25,7 +26,7 @@ mod tanh;
 use crate::format::{Arithmetic, Blob, Floats, MAX_FEATURES, MAX_LAYERS, MAX_OUTPUTS, NetworkLayout, Refusal};
 
 pub use crate::format::Activation;
-pub use kernel::portable::requantise;
+pub use requantisation::requantise;
 pub use scratch::{MAX_SCRATCH, Scratch};
 pub use shape::{INPUT_PADDING, ROWS, padded};
 pub use tanh::{TANH_CODE_ERROR, TANH_ERROR, TANH_INPUT_ONE, tanh, tanh_code};

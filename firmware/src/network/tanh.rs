@@ -1,13 +1,14 @@
 //! Hyperbolic tangent: on 16-bit codes by a table of chords, in f32 by a table of cubics.
 //!
-//! Both use integer arithmetic, or + - and × of f32 alone: the same bits on every machine, the same instructions for every argument.
+//! Both use integer arithmetic, or + - and × of f32 alone: the same bits on every machine, the same instructions for every
+//! argument.
 
 /// Code of a pre-activation of 1: the input's range is ±5⅓.
 pub const TANH_INPUT_ONE: i32 = 6144;
 
-/// Largest difference of [`tanh_code`] from the exact function, apart from the rounding to the output code: 256 chords, each moved to
-/// the middle between the curve's extremes, cost h²/16 · max|tanh''| = 8.4e-5 (h = 1/24), the table's own rounding and the end of the
-/// range (1 - tanh 5⅓ = 4.7e-5) less.
+/// Largest difference of [`tanh_code`] from the exact function, apart from the rounding to the output code: 256 chords, each
+/// moved to the middle between the curve's extremes, cost h²/16 · max|tanh''| = 8.4e-5 (h = 1/24), the table's own rounding and
+/// the end of the range (1 - tanh 5⅓ = 4.7e-5) less.
 pub const TANH_CODE_ERROR: f64 = 1.15e-4;
 
 /// Chords over the range.
@@ -22,9 +23,9 @@ const TABLE_ONE: f64 = 32_768.0;
 #[repr(align(16))]
 pub(super) struct Table([i32; CHORDS]);
 
-/// For each chord in the upper half of a word its start (even chords) or its end (odd ones) in units of 1/32768, in the lower half its
-/// rise in half units (at most 2731): as part of the other number that is less than 1/20 of a unit. An argument's lowest nine bits,
-/// signed, are the way from that point, so that no bit has to be masked.
+/// For each chord in the upper half of a word its start (even chords) or its end (odd ones) in units of 1/32768, in the lower
+/// half its rise in half units (at most 2731): as part of the other number that is less than 1/20 of a unit. An argument's lowest
+/// nine bits, signed, are the way from that point, so that no bit has to be masked.
 pub(super) static TABLE: Table = table();
 
 const fn nearest(value: f64) -> i32 {
@@ -68,10 +69,11 @@ pub fn tanh_code(code: i16, limit: u16) -> i16 {
     let way = (place << (15 - CHORD_SHIFT)) as i16;
     let value = chord.wrapping_add(i32::from(chord as i16) * i32::from(way));
     // In units of 2⁻³¹.
-    super::kernel::portable::requantise(value, 2 * i32::from(limit)) as i16
+    super::requantisation::requantise(value, 2 * i32::from(limit)) as i16
 }
 
-/// Largest difference of [`tanh`] from the exact function: 2e-8 of the cubics, the rest the rounding of f32 (an ulp below 1 is 6e-8).
+/// Largest difference of [`tanh`] from the exact function: 2e-8 of the cubics, the rest the rounding of f32 (an ulp below 1 is
+/// 6e-8).
 pub const TANH_ERROR: f64 = 1e-7;
 
 /// Cubics in 1, spaced so that one of them is one line of an STM32F4's flash.
@@ -98,8 +100,8 @@ const fn cubics() -> [Cubic; SATURATED as usize * CUBICS + 1] {
     let (mut power, mut i) = (1.0f64, 0);
     let half = 0.5 / CUBICS as f64;
     while i < cubics.len() {
-        // Taylor's series round t = tanh x, with slope s = 1 - t²; its fourth term d⁴ is replaced by the parabola nearest to it within
-        // ±half, half² d² - half⁴ / 8.
+        // Taylor's series round t = tanh x, with slope s = 1 - t²; its fourth term d⁴ is replaced by the parabola nearest to it
+        // within ±half, half² d² - half⁴ / 8.
         let t = (1.0 - power) / (1.0 + power);
         let s = 1.0 - t * t;
         let fourth = s * t * (2.0 / 3.0 - t * t);

@@ -120,7 +120,17 @@ pub fn run(elf: &Path, working_dir: &Path, timeout: Duration) -> Result<Output> 
 
 /// [`run`] with further arguments for the emulator.
 pub fn run_with(further: &[&str], elf: &Path, working_dir: &Path, timeout: Duration) -> Result<Output> {
-    let runner = runner()?;
+    run_by(&runner()?, further, elf, working_dir, timeout)
+}
+
+/// [`run_with`] on another machine that the emulator knows.
+pub fn run_on(machine: &str, further: &[&str], elf: &Path, working_dir: &Path, timeout: Duration) -> Result<Output> {
+    let mut runner = runner()?;
+    set(&mut runner, "-machine", machine)?;
+    run_by(&runner, further, elf, working_dir, timeout)
+}
+
+fn run_by(runner: &[String], further: &[&str], elf: &Path, working_dir: &Path, timeout: Duration) -> Result<Output> {
     let (program, arguments) = runner.split_first().context("the runner is empty")?;
     ensure!(working_dir.is_dir(), "cannot start {program} in {}", working_dir.display());
     let mut command = Command::new(program);
@@ -147,13 +157,19 @@ pub fn run_with(further: &[&str], elf: &Path, working_dir: &Path, timeout: Durat
 pub fn command(further: &[&str], icount: &str, serial: &str) -> Result<Command> {
     let mut runner = runner()?;
     for (option, value) in [("-icount", icount), ("-serial", serial)] {
-        let place = runner.iter().position(|word| word == option).and_then(|place| runner.get_mut(place + 1));
-        *place.with_context(|| format!("the runner has no option {option}"))? = value.into();
+        set(&mut runner, option, value)?;
     }
     let (program, arguments) = runner.split_first().context("the runner is empty")?;
     let mut command = Command::new(program);
     command.args(further).args(arguments);
     Ok(command)
+}
+
+/// Gives an option of the runner another value.
+fn set(runner: &mut [String], option: &str, value: &str) -> Result<()> {
+    let place = runner.iter().position(|word| word == option).and_then(|place| runner.get_mut(place + 1));
+    *place.with_context(|| format!("the runner has no option {option}"))? = value.into();
+    Ok(())
 }
 
 /// Starts the emulator.
@@ -206,12 +222,20 @@ fn missing_emulator(program: &str) -> anyhow::Error {
 
 /// Fails, with what to do, if the compiler has no library for [`TARGET`].
 pub fn require_target() -> Result<()> {
-    let asked = tool("rustc").args(["--print", "target-libdir", "--target", TARGET]).output().context("cannot start rustc")?;
+    require(TARGET).map_err(|error| {
+        anyhow!(
+            "{error}\n(without rustup, on Debian or Ubuntu: tests/thumb-toolchain.sh FOLDER, then set {TOOLCHAIN_VARIABLE}=FOLDER)"
+        )
+    })
+}
+
+/// Fails, with what to do, if the compiler has no library for a target.
+pub fn require(target: &str) -> Result<()> {
+    let asked = tool("rustc").args(["--print", "target-libdir", "--target", target]).output().context("cannot start rustc")?;
     let folder = String::from_utf8_lossy(&asked.stdout).trim().to_owned();
     ensure!(
         asked.status.success() && Path::new(&folder).is_dir(),
-        "the compiler has no target {TARGET}; run: rustup target add {TARGET}\n\
-         (without rustup, on Debian or Ubuntu: tests/thumb-toolchain.sh FOLDER, then set {TOOLCHAIN_VARIABLE}=FOLDER)"
+        "the compiler has no target {target}; run: rustup target add {target}"
     );
     Ok(())
 }

@@ -6,9 +6,9 @@ use anyhow::{Result, ensure};
 use clap::{Parser, ValueEnum};
 use impromptu_tests::mcu::{measurement::measure, table};
 
-/// Instructions, modelled cycles, memory and error of neural-network kernels on an emulated STM32F405.
+/// Instructions, modelled cycles, memory and error of neural-network kernels on an emulated STM32F405; instructions on other cores.
 ///
-/// Builds for thumbv7em-none-eabihf and runs in qemu-system-arm; a C compiler builds the cycle model. Deterministic.
+/// Builds for thumbv7em-none-eabihf and the other cores' targets and runs in qemu-system-arm; a C compiler builds the cycle model. Deterministic.
 #[derive(Debug, Parser)]
 #[command(name = "cargo mcu", version)]
 struct Arguments {
@@ -27,7 +27,7 @@ struct Arguments {
 enum Format {
     /// For people.
     Table,
-    /// An array of rows.
+    /// An array of rows; those of other cores name the core.
     Json,
 }
 
@@ -51,7 +51,11 @@ fn run() -> Result<()> {
     );
     match arguments.format {
         Format::Table => print!("{}", table::text(&results)),
-        Format::Json => println!("{}", serde_json::to_string_pretty(&results.rows)?),
+        Format::Json => {
+            let others = results.cores.iter().map(serde_json::to_value);
+            let rows: Vec<_> = results.rows.iter().map(serde_json::to_value).chain(others).collect::<Result<_, _>>()?;
+            println!("{}", serde_json::to_string_pretty(&rows)?);
+        }
     }
     Ok(())
 }

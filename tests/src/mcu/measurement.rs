@@ -11,6 +11,7 @@ use anyhow::{Context, Result, ensure};
 use serde::Serialize;
 
 use super::{
+    cores::{self, CoreRow},
     counter::{self, Entry, Used},
     kernels::{KERNELS, Kernel},
     memory::Symbols,
@@ -73,6 +74,8 @@ pub struct Results {
     pub rows: Vec<Row>,
     /// What has no row.
     pub left_out: Vec<LeftOut>,
+    /// Our kernels on other cores.
+    pub cores: Vec<CoreRow>,
 }
 
 /// Builds what is needed and measures the kernels and networks that `wanted` accepts by their names.
@@ -83,7 +86,7 @@ pub fn measure(wanted: impl Fn(&str, &str) -> bool) -> Result<Results> {
     let plugin = counter::build()?;
     let nets = Net::all()?;
     let mut boards = BTreeMap::new();
-    let mut results = Results { rows: Vec::new(), left_out: Vec::new() };
+    let mut results = Results { rows: Vec::new(), left_out: Vec::new(), cores: Vec::new() };
     for net in &nets {
         for kernel in KERNELS.iter().filter(|kernel| wanted(kernel.name, net.name)) {
             if let Some(reason) = kernel.refusal(net) {
@@ -100,6 +103,7 @@ pub fn measure(wanted: impl Fn(&str, &str) -> bool) -> Result<Results> {
             results.rows.push(row);
         }
     }
+    results.cores = cores::measure(&plugin, &nets, |kernel| wanted(kernel, cores::NET))?;
     Ok(results)
 }
 

@@ -4,7 +4,10 @@ use std::fmt::Write;
 
 use comfy_table::{Cell, CellAlignment, LineStyle, Table, presets};
 
-use super::measurement::{Results, Row};
+use super::{
+    cores::CoreRow,
+    measurement::{Results, Row},
+};
 
 /// What the columns mean.
 const LEGEND: &str = "\
@@ -14,6 +17,12 @@ flash:   code and weights in flash, 5 wait states; RAM: the code stays in flash,
 bytes:   flash holds the functions that ran (whole), their tables and the weights; code is the instructions that ran and the tables;
          RAM is working memory and stack.
 error:   largest difference to the network in f64.
+";
+
+/// What the second table shows.
+const CORES: &str = "\
+Executed instructions on other cores in QEMU, the most of the same inputs; the same bits on all. Model file and code in RAM without wait
+states: cycles are not modelled. Integer kernels use the DSP extension, float kernels the FPU, where there is one.
 ";
 
 /// Engines that no package registry has, measured elsewhere with the same model and the same network shape.
@@ -34,13 +43,10 @@ pub fn text(results: &Results) -> String {
             seen.push(net);
         }
     }
-    let mut table = Table::new();
     let header = ["net", "kernel", "instructions", "flash", "RAM", "no wait", "flash B", "code B", "RAM B", "error"];
-    table
-        .load_style(presets::UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()))
-        .set_header(aligned(header.map(str::to_owned)));
+    let mut table = titled(header.map(str::to_owned), 2);
     for row in seen.iter().flat_map(|net| results.rows.iter().filter(move |row| row.net == *net)) {
-        table.add_row(aligned(cells(row)));
+        table.add_row(aligned(cells(row), 2));
     }
     let table = table.trim_fmt();
     // Writing to a string never fails.
@@ -48,16 +54,38 @@ pub fn text(results: &Results) -> String {
     for left in &results.left_out {
         let _ = writeln!(text, "No row for {} on {}: {}.", left.kernel, left.net, left.reason);
     }
-    let _ = write!(text, "{}{ELSEWHERE}", if results.left_out.is_empty() { "" } else { "\n" });
+    let _ = write!(text, "{}", if results.left_out.is_empty() { "" } else { "\n" });
+    if let Some(table) = cores(&results.cores) {
+        let _ = writeln!(text, "{CORES}\n{table}\n");
+    }
+    text += ELSEWHERE;
     text
 }
 
-/// Names to the left, numbers to the right.
-fn aligned(texts: [String; 10]) -> impl Iterator<Item = Cell> {
-    texts
-        .into_iter()
-        .enumerate()
-        .map(|(column, text)| Cell::new(text).set_alignment(if column < 2 { CellAlignment::Left } else { CellAlignment::Right }))
+/// The second table, if anything stands in it: a line for each core, a column for each kernel.
+fn cores(rows: &[CoreRow]) -> Option<String> {
+    let lines: Vec<&[CoreRow]> = rows.chunk_by(|row, next| row.core == next.core).collect();
+    let kernels = lines.first()?.iter().map(|row| row.kernel);
+    let mut table = titled(["net", "core", "target", "uses"].into_iter().chain(kernels).map(str::to_owned), 4);
+    for line in lines {
+        let Some(CoreRow { net, core, target, uses, .. }) = line.first() else { continue };
+        let names = [net, core, target, uses].map(|name| (*name).to_owned());
+        table.add_row(aligned(names.into_iter().chain(line.iter().map(|row| row.instructions.to_string())), 4));
+    }
+    Some(table.trim_fmt())
+}
+
+/// A table with nothing but its header.
+fn titled(header: impl IntoIterator<Item = String>, names: usize) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none())).set_header(aligned(header, names));
+    table
+}
+
+/// So many names to the left, then numbers to the right.
+fn aligned(texts: impl IntoIterator<Item = String>, names: usize) -> impl Iterator<Item = Cell> {
+    let side = move |column| if column < names { CellAlignment::Left } else { CellAlignment::Right };
+    texts.into_iter().enumerate().map(move |(column, text)| Cell::new(text).set_alignment(side(column)))
 }
 
 fn cells(row: &Row) -> [String; 10] {

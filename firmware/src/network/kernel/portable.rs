@@ -1,14 +1,7 @@
 //! The kernels in safe Rust, for every machine: the definition of the bits that the assembly must give.
 
-use super::{Finish, Width, float_blocks};
-use crate::network::{self, ROWS, tanh_code};
-
-/// Upper bits of accumulator × multiplier + 2³¹.
-#[inline(always)]
-pub fn requantise(accumulator: i32, multiplier: i32) -> i32 {
-    let product = i64::from(accumulator) * i64::from(multiplier);
-    (product.wrapping_add(1 << 31) >> 32) as i32
-}
+use super::stream::{Finish, Width, float_blocks};
+use crate::network::{self, ROWS, requantise, tanh_code};
 
 /// The two signed halves of a word, low half first.
 #[inline(always)]
