@@ -1,5 +1,6 @@
 //! What the promises need to be tested: the emulated microcontroller, its cycle model, proofs on its binaries,
-//! C programs, other cores, golden texts, bytes for the decoder and the link, the structure of the sources. The promises themselves are in `tests/`.
+//! C programs, other cores, golden texts, bytes for the decoder and the link, the structure of the sources. The promises
+//! themselves are in `tests/`.
 //!
 //! | layer | modules | what they hold |
 //! |--:|---|---|

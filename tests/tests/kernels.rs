@@ -1,5 +1,5 @@
-//! Layers, networks and flights give the same bits on every core and in WebAssembly: the kernels in assembly, their portable twin beside
-//! them, and this machine's.
+//! Layers, networks and flights give the same bits on every core and in WebAssembly: the kernels in assembly, their portable twin
+//! beside them, and this machine's.
 
 mod layers;
 mod web_assembly;
@@ -22,8 +22,8 @@ const ROWS: usize = 8;
 /// Control ticks of a flight, 3 s.
 const TICKS: u32 = 1_500;
 
-/// `layers` random layers, the golden models, trained and random networks of all kinds, and flights; none needs more than `room` bytes
-/// for its stream or model.
+/// `layers` random layers, the golden models, trained and random networks of all kinds, and flights; none needs more than `room`
+/// bytes for its stream or model.
 fn cases(layers: usize, room: usize, flights: bool) -> Cases {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(8);
     let mut cases = Cases::default();

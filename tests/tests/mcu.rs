@@ -87,8 +87,8 @@ fn int8_takes_the_same_on_every_core_with_the_dsp_extension() {
     assert!(instructions("M3") > 3 * instructions("M4F"));
 }
 
-/// Zeros and inputs far out of range take what typical inputs take, to the cycle; with tanh within what the flash lines of its table
-/// make, which other values read.
+/// Zeros and inputs far out of range take what typical inputs take, to the cycle; with tanh within what the flash lines of its
+/// table make, which other values read.
 #[test]
 fn the_worst_case_of_int8_is_the_typical_case() {
     for row in RESULTS.rows.iter().filter(|row| row.kernel == "int8") {

@@ -1,7 +1,7 @@
 //! What makes a code of an accumulator.
 //!
-//! *in* a 32-bit accumulator and a multiplier; *out* their product's upper half, rounded; *never* an overflow; *source* Jacob et al.
-//! 2018, section 2.2. What differs: no shift after it, so that one SMMULR does it.
+//! *in* a 32-bit accumulator and a multiplier; *out* their product's upper half, rounded; *never* an overflow; *source* Jacob et
+//! al. 2018, section 2.2. What differs: no shift after it, so that one SMMULR does it.
 
 /// Upper bits of accumulator × multiplier + 2³¹.
 #[inline(always)]

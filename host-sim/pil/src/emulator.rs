@@ -224,7 +224,8 @@ fn missing_emulator(program: &str) -> anyhow::Error {
 pub fn require_target() -> Result<()> {
     require(TARGET).map_err(|error| {
         anyhow!(
-            "{error}\n(without rustup, on Debian or Ubuntu: tests/thumb-toolchain.sh FOLDER, then set {TOOLCHAIN_VARIABLE}=FOLDER)"
+            "{error}\n(without rustup, on Debian or Ubuntu: tests/thumb-toolchain.sh FOLDER, then set \
+             {TOOLCHAIN_VARIABLE}=FOLDER)"
         )
     })
 }

@@ -9,7 +9,8 @@ pub(crate) fn unanswered(study: &Study, rows: &[u8]) -> Vec<u8> {
     rows.iter().copied().filter(|row| !study.findings.iter().any(|finding| finding.rows.contains(row))).collect()
 }
 
-/// Asserts that each number and figure has a name of its own, numbers are finite and figures can be read. Gives the figures' names.
+/// Asserts that each number and figure has a name of its own, numbers are finite and figures can be read. Gives the figures'
+/// names.
 pub(crate) fn assert_readable(study: &Study) -> Vec<&str> {
     let figures: Vec<&str> = study.figures.iter().map(|figure| figure.name.as_str()).collect();
     let mut names: Vec<&str> = study.findings.iter().map(|finding| finding.name.as_str()).chain(figures.clone()).collect();

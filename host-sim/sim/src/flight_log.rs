@@ -4,8 +4,8 @@
 //! *source* Zhou 2017, Fig. 1: u (reference), y and x (measured) of the baseline are all that training needs.
 //!
 //! Columns, in SI units and the world frame ENU: `time_s`; `desired_{x,y,z}_m`, `desired_{vx,vy,vz}_m_s`,
-//! `desired_{ax,ay,az}_m_s2` (optional), `desired_yaw_rad` (optional); `reference_{x,y,z}_m`, `reference_{vx,vy,vz}_m_s` (what the loop
-//! received); `measured_{x,y,z}_m`, `measured_{vx,vy,vz}_m_s` (as the loop received it, so as late as that);
+//! `desired_{ax,ay,az}_m_s2` (optional), `desired_yaw_rad` (optional); `reference_{x,y,z}_m`, `reference_{vx,vy,vz}_m_s` (what
+//! the loop received); `measured_{x,y,z}_m`, `measured_{vx,vy,vz}_m_s` (as the loop received it, so as late as that);
 //! `true_{x,y,z}_m` (optional, simulators only). Further columns are ignored.
 
 use std::{io, ops::Range, path::Path};
@@ -35,7 +35,8 @@ pub struct LogRow {
     pub measured_position: [f64; 3],
     /// Velocity as the loop was told, m/s.
     pub measured_velocity: [f64; 3],
-    /// Roll, pitch, yaw (rad), body rates (rad/s) and vertical acceleration (m/s²) as the add-on was told, where the log has them: CSV has not.
+    /// Roll, pitch, yaw (rad), body rates (rad/s) and vertical acceleration (m/s²) as the add-on was told, where the log has
+    /// them: CSV has not.
     pub measured_body: Option<[f64; BODY]>,
     /// True position, m, where somebody knows it.
     pub true_position: Option<[f64; 3]>,

@@ -1,5 +1,6 @@
-//! A quadrotor in closed loop with its firmware: what it shall fly, the body and the air that it flies in, what it measures, and what came
-//! of it. Usable by itself: no threads are needed (feature `threads`), no files (vehicles are in the program, CSV is read from any source).
+//! A quadrotor in closed loop with its firmware: what it shall fly, the body and the air that it flies in, what it measures, and
+//! what came of it. Usable by itself: no threads are needed (feature `threads`), no files (vehicles are in the program, CSV is
+//! read from any source).
 //!
 //! ```text
 //! Trajectory ──► setpoint ──► flight stack (the firmware's own) ──► motor commands ──► Plant ◄── Weather
@@ -7,15 +8,16 @@
 //!                                   └──────────── delay ◄── Sensors ◄───────────────────┘ ──► FlightLog
 //! ```
 //!
-//! SI units; world frame ENU (z up), body frame FLU, Hamilton quaternion body to world; f64 here, f32 in the firmware. Everything random comes
-//! from a seed; the same seed gives the same bits on any number of threads.
+//! SI units; world frame ENU (z up), body frame FLU, Hamilton quaternion body to world; f64 here, f32 in the firmware. Everything
+//! random comes from a seed; the same seed gives the same bits on any number of threads.
 //!
-//! The lowest layer is physics and wishes, neither of which knows the other. Above it is what disturbs and what measures, then the condition
-//! that names both, then flights through the firmware, and at the top a loop that flies many of them.
+//! The lowest layer is physics and wishes, neither of which knows the other. Above it is what disturbs and what measures, then
+//! the condition that names both, then flights through the firmware, and at the top a loop that flies many of them.
 //!
 //! | layer | modules | what they hold |
 //! |---|---|---|
-//! | 1 | `plant`, `trajectory`, `columns` | the rigid body with its rotors and vehicle files; what is desired at each tick; tables with named columns |
+//! | 1 | `plant`, `trajectory` | the rigid body with its rotors and vehicle files; what is desired at each tick |
+//! | 1 | `columns` | tables with named columns |
 //! | 2 | `weather`, `sensors`, `flight_log` | wind and disturbance; noise and delay; what a flight leaves behind, as CSV |
 //! | 3 | `condition` | what a flight meets, by name |
 //! | 4 | `rollout` | closed-loop flights, eight at once |

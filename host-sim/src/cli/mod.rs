@@ -1,7 +1,7 @@
 //! The command line of `host-sim`: the whole demo, or one of its steps on files.
 //!
-//! *in* arguments, TOML, CSV, JSON and model files; *out* results on stdout, progress and messages on stderr, an exit code; *never* a file
-//! that is half written, or one replaced although something failed.
+//! *in* arguments, TOML, CSV, JSON and model files; *out* results on stdout, progress and messages on stderr, an exit code;
+//! *never* a file that is half written, or one replaced although something failed.
 
 mod collect;
 mod configuration;

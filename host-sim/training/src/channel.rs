@@ -1,8 +1,8 @@
 //! Channels of logs: one reference, one measured value, for the diagnosis.
 //!
-//! *in* flight logs, or CSV files of any loop; *out* records; *never* a measured value that is older than stated; *source* Zhou 2017,
-//! Fig. 1: u and y of the baseline. Of a flight log the desired position is u: without an add-on it is the reference but for a dither,
-//! which the velocity reference does not share and which here counts as noise.
+//! *in* flight logs, or CSV files of any loop; *out* records; *never* a measured value that is older than stated; *source* Zhou
+//! 2017, Fig. 1: u and y of the baseline. Of a flight log the desired position is u: without an add-on it is the reference but
+//! for a dither, which the velocity reference does not share and which here counts as noise.
 
 use std::path::Path;
 
@@ -71,8 +71,9 @@ fn fresh(time: &[f64], reference: &[f64], measured: &[f64], age_s: f64) -> Resul
     Record::new(&time[..later.len()], &reference[..later.len()], &later)
 }
 
-/// Channels of a CSV file: those of the columns asked for (time, reference, measured); or every axis of a flight log, of which the
-/// diagnosis needs `time_s`, `desired_{x,y,z}_m` and `measured_{x,y,z}_m`; or `time_s`, `reference` (or `desired`) and `measured`.
+/// Channels of a CSV file: those of the columns asked for (time, reference, measured); or every axis of a flight log, of which
+/// the diagnosis needs `time_s`, `desired_{x,y,z}_m` and `measured_{x,y,z}_m`; or `time_s`, `reference` (or `desired`) and
+/// `measured`.
 ///
 /// # Errors
 /// Names the file, the line and the column of what is wrong.

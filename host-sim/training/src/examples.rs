@@ -1,9 +1,10 @@
 //! Training examples from flight logs: what the loop was asked when it did what it did.
 //!
-//! *in* [`FlightLog`]s of the baseline; *out* rows of features and corrections; *never* another feature function than the firmware's;
-//! *source* Zhou 2017, section III-A: the inverse is learned by putting the measured output in the place of the desired one, so that
-//! the correction is reference minus output. What differs: late measurements are shifted back by the known delay, and noisy
-//! logs are smoothed with zero phase, output and reference alike, which leaves a linear relation between them as it is.
+//! *in* [`FlightLog`]s of the baseline; *out* rows of features and corrections; *never* another feature function than the
+//! firmware's; *source* Zhou 2017, section III-A: the inverse is learned by putting the measured output in the place of the
+//! desired one, so that the correction is reference minus output. What differs: late measurements are shifted back by the known
+//! delay, and noisy logs are smoothed with zero phase, output and reference alike, which leaves a linear relation between them as
+//! it is.
 
 use impromptu_firmware::features::{self, Feature, Signals};
 use impromptu_flight::quadrotor::{DESIRED, MEASURED, REFERENCE};
@@ -114,7 +115,8 @@ impl Signals for Flown {
 /// Corrections below this are not worth more than others, m.
 const LEAST_CORRECTION: f64 = 0.02;
 
-/// Every log counts by its relative error, as flights are judged: its rows weigh the reciprocal of its mean squared position correction.
+/// Every log counts by its relative error, as flights are judged: its rows weigh the reciprocal of its mean squared position
+/// correction.
 ///
 /// Rows of features and labels (position and velocity correction, m and m/s) from `logs`.
 ///

@@ -1,10 +1,10 @@
 //! Choice of the feedback lane: designs from dithered logs, judged in flight.
 //!
-//! A design is admissible if no validation flight, at nominal, with 10 and 20 ms more delay in the whole loop, and with the loop's gain
-//! times 0.7 and 1.3, is worse than the baseline's flight of the same trajectory, except where the network lane alone is worse too: for a
-//! vehicle that tumbles without the lane the lane is not to blame. Among the admissible ones the best score is taken: average
-//! and worst flight of each of these cases, the nominal one counting most: what a user gets also when the vehicle is not quite
-//! the one that was identified.
+//! A design is admissible if no validation flight, at nominal, with 10 and 20 ms more delay in the whole loop, and with the
+//! loop's gain times 0.7 and 1.3, is worse than the baseline's flight of the same trajectory, except where the network lane alone
+//! is worse too: for a vehicle that tumbles without the lane the lane is not to blame. Among the admissible ones the best score
+//! is taken: average and worst flight of each of these cases, the nominal one counting most: what a user gets also when the
+//! vehicle is not quite the one that was identified.
 
 use impromptu_firmware::{
     adapter::Lanes,
@@ -271,8 +271,8 @@ fn worst_to_answer_for(baseline: &[f64], network_alone: &[f64], errors: &[f64]) 
     answerable.map(|((baseline, _), error)| 100.0 * (1.0 - error / baseline)).fold(100.0, f64::min)
 }
 
-/// A nominal flight may lose this much, per cent of the baseline's error, against the network lane alone; of what the worst one loses
-/// beyond it, a share is taken off the score: it is one flight of many.
+/// A nominal flight may lose this much, per cent of the baseline's error, against the network lane alone; of what the worst one
+/// loses beyond it, a share is taken off the score: it is one flight of many.
 const LOSS_AGAINST_NETWORK: f64 = 1.0;
 const LOSS_SHARE: f64 = 0.2;
 

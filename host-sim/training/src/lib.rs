@@ -1,4 +1,5 @@
-//! From flight logs to models: what `impromptu-sim` has flown, or somebody's own vehicle, becomes the file that the firmware flies.
+//! From flight logs to models: what `impromptu-sim` has flown, or somebody's own vehicle, becomes the file that the firmware
+//! flies.
 //!
 //! ```text
 //! training flights ──► logs ──► sound ones ──► examples ──► ridge, networks ──► candidates ──► flights choose ──► model files
@@ -7,17 +8,22 @@
 //!                                 └──────► response for the guard's monitor ────────────────────────┘
 //! ```
 //!
-//! *in* a [`Recipe`] and a loop, or logs; *out* models; *never* a choice made on the test flights; *source* Zhou 2017, sections III and V.
+//! *in* a [`Recipe`] and a loop, or logs; *out* models; *never* a choice made on the test flights; *source* Zhou 2017, sections
+//! III and V.
 //!
-//! At the bottom are methods that know no recipe: supervised training from rows, identification and design of a feedback lane from signals,
-//! channels for the diagnosis. Above them is the recipe, which decides how a model comes about, and the single steps: leave out flights
-//! that broke down, hold some out, learn, describe, choose a lane, measure what the monitor needs. A [`Pipeline`] does them all, whatever the
-//! logs come from; [`build()`] flies the logs first.
+//! At the bottom are methods that know no recipe: supervised training from rows, identification and design of a feedback lane
+//! from signals, channels for the diagnosis. Above them is the recipe, which decides how a model comes about, and the single
+//! steps: leave out flights that broke down, hold some out, learn, describe, choose a lane, measure what the monitor needs. A
+//! [`Pipeline`] does them all, whatever the logs come from; [`build()`] flies the logs first.
 //!
 //! | layer | modules | what they hold |
 //! |---|---|---|
-//! | 1 | `supervised`, `feedback_design`, `channel`, `breakdown`, `hold_out`, `bypass`, `purpose`, `observer` | rows to networks; identification and design of the lane; channels of logs; flights that teach nothing; logs held out; inputs past a network; seeds; who watches |
-//! | 2 | `examples`, `gates`, `recipe` | rows of features from logs; the diagnosis before a training; everything that decides, as data |
+//! | 1 | `supervised`, `bypass` | rows to networks; inputs past a network |
+//! | 1 | `feedback_design` | identification and design of the feedback lane |
+//! | 1 | `channel`, `breakdown`, `hold_out` | channels of logs; flights that teach nothing; logs that are held out |
+//! | 1 | `purpose`, `observer` | seeds; who watches |
+//! | 2 | `examples`, `gates` | rows of features from logs; the diagnosis before a training |
+//! | 2 | `recipe` | everything that decides, as data |
 //! | 3 | `learn` | logs to networks |
 //! | 4 | `error`, `files`, `models` | why there are no models; files written whole; descriptions |
 //! | 5 | `validation`, `lane_choice` | flights that judge; what comes of the choice of a lane |

@@ -6,9 +6,11 @@ use anyhow::{Result, ensure};
 use clap::{Parser, ValueEnum};
 use impromptu_tests::mcu::{measurement::measure, table};
 
-/// Instructions, modelled cycles, memory and error of neural-network kernels on an emulated STM32F405; instructions on other cores.
+/// Instructions, modelled cycles, memory and error of neural-network kernels on an emulated STM32F405; instructions on other
+/// cores.
 ///
-/// Builds for thumbv7em-none-eabihf and the other cores' targets and runs in qemu-system-arm; a C compiler builds the cycle model. Deterministic.
+/// Builds for thumbv7em-none-eabihf and the other cores' targets and runs in qemu-system-arm; a C compiler builds the cycle
+/// model. Deterministic.
 #[derive(Debug, Parser)]
 #[command(name = "cargo mcu", version)]
 struct Arguments {

@@ -182,7 +182,8 @@ impl<'p> Board<'p> {
         })
     }
 
-    /// Evaluates `inputs` under the cycle model. The first row runs twice and counts once: flash lines are then as they are in flight.
+    /// Evaluates `inputs` under the cycle model. The first row runs twice and counts once: flash lines are then as they are in
+    /// flight.
     fn count(&self, kernel: &Kernel, net: &Net, in_ram: bool, inputs: &[Vec<f32>]) -> Result<(Answer, Vec<Entry>, Used)> {
         let warm: Vec<Vec<f32>> = inputs.iter().take(1).chain(inputs).cloned().collect();
         let counts = self.folder(kernel, net).join("counts.json");

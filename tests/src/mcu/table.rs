@@ -11,17 +11,22 @@ use super::{
 
 /// What the columns mean.
 const LEGEND: &str = "\
-Instructions are exact (QEMU); cycles are modelled for the STM32F405 at 168 MHz (tests/cycles), +-10 to 15 %. The most of six inputs:
-four typical ones, zeros, far out of range. Quantising the inputs and scaling the outputs are included; one compiler, the same flags for all.
-flash:   code and weights in flash, 5 wait states; RAM: the code stays in flash, the weights are in RAM (64 KiB); no wait: as if flash had none.
-bytes:   flash holds the functions that ran (whole), their tables and the weights; code is the instructions that ran and the tables;
+Instructions are exact (QEMU); cycles are modelled for the STM32F405 at 168 MHz (tests/cycles), +-10 to 15 %. The most of six \
+inputs:
+four typical ones, zeros, far out of range. Quantising the inputs and scaling the outputs are included; one compiler, the same \
+flags for all.
+flash:   code and weights in flash, 5 wait states; RAM: the code stays in flash, the weights are in RAM (64 KiB); no wait: as \
+if flash had none.
+bytes:   flash holds the functions that ran (whole), their tables and the weights; code is the instructions that ran and the \
+tables;
          RAM is working memory and stack.
 error:   largest difference to the network in f64.
 ";
 
 /// What the second table shows.
 const CORES: &str = "\
-Executed instructions on other cores in QEMU, the most of the same inputs; the same bits on all. Model file and code in RAM without wait
+Executed instructions on other cores in QEMU, the most of the same inputs; the same bits on all. Model file and code in RAM \
+without wait
 states: cycles are not modelled. Integer kernels use the DSP extension, float kernels the FPU, where there is one.
 ";
 

@@ -1,5 +1,5 @@
-//! The machines that run the program in `firmware/board/twins`: Cortex-M cores in QEMU. Nothing skips: without a target or the emulator
-//! it fails, with the line that installs what is missing.
+//! The machines that run the program in `firmware/board/twins`: Cortex-M cores in QEMU. Nothing skips: without a target or the
+//! emulator it fails, with the line that installs what is missing.
 
 use std::{
     env,
@@ -64,7 +64,8 @@ impl Core {
     /// Runs cases and compares their bits with those of this machine, with further arguments for the emulator.
     ///
     /// # Errors
-    /// If a tool is missing, with the line that installs it; if the core fails, runs other kernels than it should, or gives other bits.
+    /// If a tool is missing, with the line that installs it; if the core fails, runs other kernels than it should, or gives other
+    /// bits.
     pub fn run(&self, cases: &Cases, further: &[&str]) -> Result<()> {
         self.run_all(cases, further).with_context(|| format!("{} on {}", self.name, self.machine))
     }

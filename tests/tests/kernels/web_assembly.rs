@@ -1,4 +1,5 @@
-//! The program in a WebAssembly interpreter: what it reads and writes lies in its memory (`firmware/board/twins/src/letterbox.rs`).
+//! The program in a WebAssembly interpreter: what it reads and writes lies in its memory
+//! (`firmware/board/twins/src/letterbox.rs`).
 
 use std::fs;
 

@@ -1,7 +1,8 @@
 //! Fig. 4: difference learning on a baseline without unit DC gain.
 //!
-//! *in* the predecessor's loop with its vertical reference halved; *out* where the height settles; *never* another training for the two lists but
-//! their inputs; *source* Zhou 2017, Lemma 1 and Fig. 4: y_ss = K0 (K + b). The cure with absolute heights is ours.
+//! *in* the predecessor's loop with its vertical reference halved; *out* where the height settles; *never* another training for
+//! the two lists but their inputs; *source* Zhou 2017, Lemma 1 and Fig. 4: y_ss = K0 (K + b). The cure with absolute heights is
+//! ours.
 
 use impromptu_firmware::{
     features::{Feature, Relative, Source},

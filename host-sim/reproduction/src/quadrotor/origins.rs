@@ -1,7 +1,7 @@
 //! Reference points of difference learning, and learning without differences.
 //!
-//! *in* the predecessor's loop, the network with 12 inputs; *out* reductions for each of {inputs, output} x {y_d, y}; *never* another training for
-//! another reference point: in the training data y_d and y are the same; *source* Zhou 2017, Insight 3.
+//! *in* the predecessor's loop, the network with 12 inputs; *out* reductions for each of {inputs, output} x {y_d, y}; *never*
+//! another training for another reference point: in the training data y_d and y are the same; *source* Zhou 2017, Insight 3.
 
 use impromptu_report::study::{Finding, Study};
 use impromptu_training::Labels;
@@ -62,8 +62,10 @@ pub(super) fn run(ground: &Ground<'_>, twelve_inputs: &Learned, study: &mut Stud
     }
     study.note(
         SECTION,
-        "One network serves all four choices: in the training data the output stands in the place of the desired state, so that both reference \
-         points coincide. An output that is added to the measured state, or inputs that are taken relative to it, close a second loop around \
+        "One network serves all four choices: in the training data the output stands in the place of the desired state, so that \
+         both reference \
+         points coincide. An output that is added to the measured state, or inputs that are taken relative to it, close a \
+         second loop around \
          the baseline through the held sub-rate tick.",
     );
     Ok(())

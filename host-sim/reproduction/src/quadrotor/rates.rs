@@ -1,7 +1,8 @@
 //! Sub-rate and preview: how often the network must run, and how far it must look ahead.
 //!
-//! *in* a Crazyflie and the predecessor's loop; *out* reductions over validation-like strokes by sub-rate, held and interpolated, and by preview;
-//! *never* a sub-rate that is not a whole part of the reference's rate; *source* Zhou 2017, section V-A (the module is slower than the loop).
+//! *in* a Crazyflie and the predecessor's loop; *out* reductions over validation-like strokes by sub-rate, held and interpolated,
+//! and by preview; *never* a sub-rate that is not a whole part of the reference's rate; *source* Zhou 2017, section V-A (the
+//! module is slower than the loop).
 
 use impromptu_firmware::model::Interpolation;
 use impromptu_flight::flight::PREVIEW;

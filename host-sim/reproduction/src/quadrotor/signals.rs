@@ -1,7 +1,7 @@
 //! What the training flights must excite.
 //!
-//! *in* five training signals of about equal length; *out* reductions with the same 12 inputs, network and budget; *never* a signal with the test's
-//! trajectories in it; *source* Li et al., ICRA 2017 (three growing tones); the others are ours.
+//! *in* five training signals of about equal length; *out* reductions with the same 12 inputs, network and budget; *never* a
+//! signal with the test's trajectories in it; *source* Li et al., ICRA 2017 (three growing tones); the others are ours.
 
 use impromptu_report::{
     Axis, Curve, Figure,
@@ -106,8 +106,10 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<()> 
     });
     study.note(
         SECTION,
-        "R² on rows of the same signal says nothing about the reduction in flight: a signal that excites little is easily fitted. Without noise a linear \
-         map finds the loop's inverse in any of them; a network with the loop through the measured state closed needs rows all around.",
+        "R² on rows of the same signal says nothing about the reduction in flight: a signal that excites little is easily \
+         fitted. Without noise a linear \
+         map finds the loop's inverse in any of them; a network with the loop through the measured state closed needs rows all \
+         around.",
     );
     Ok(())
 }

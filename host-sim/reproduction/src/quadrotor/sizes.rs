@@ -1,7 +1,8 @@
 //! Network sizes: tracking against cycles on the microcontroller.
 //!
-//! *in* a Crazyflie in the lab and a clean brushless one, trained up to twice the test strokes' speed; *out* reductions at 1 and 1.7 times the speed, and cycles; *never* cycles that
-//! the golden table contradicts; *source* `tests/golden/mcu.txt`: cycles of the int8 kernel with its weights in flash.
+//! *in* a Crazyflie in the lab and a clean brushless one, trained up to twice the test strokes' speed; *out* reductions at 1 and
+//! 1.7 times the speed, and cycles; *never* cycles that the golden table contradicts; *source* `tests/golden/mcu.txt`: cycles of
+//! the int8 kernel with its weights in flash.
 
 use impromptu_model_export::float_network::Activation;
 use impromptu_report::{
@@ -107,8 +108,10 @@ pub(super) fn run(crazyflie: &Crazyflie, study: &mut Study) -> anyhow::Result<()
     });
     study.note(
         SECTION,
-        "Cycles are those of the int8 kernel, estimated as 0.733 a multiply-add and 90.3 a neuron through two rows of the golden table; the networks \
-         were flown in f32 (tanh up to two layers, ReLU beyond). All have the linear map beside them. 168 MHz are 1,680,000 cycles in a reference \
+        "Cycles are those of the int8 kernel, estimated as 0.733 a multiply-add and 90.3 a neuron through two rows of the \
+         golden table; the networks \
+         were flown in f32 (tanh up to two layers, ReLU beyond). All have the linear map beside them. 168 MHz are 1,680,000 \
+         cycles in a reference \
          tick of 10 ms: what decides is flash, and what other tasks leave.",
     );
     Ok(())

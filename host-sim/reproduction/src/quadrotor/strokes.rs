@@ -1,7 +1,7 @@
 //! Thirty strokes that nobody trained on, by every method.
 //!
-//! *in* the predecessor's loop, and a Crazyflie in the lab; *out* mean, worst and distribution of the reductions; *never* a choice made on these
-//! strokes; *source* Li et al., ICRA 2017 (43 % over 30 hand-drawn trajectories).
+//! *in* the predecessor's loop, and a Crazyflie in the lab; *out* mean, worst and distribution of the reductions; *never* a
+//! choice made on these strokes; *source* Li et al., ICRA 2017 (43 % over 30 hand-drawn trajectories).
 
 use impromptu_firmware::adapter::Lanes;
 use impromptu_report::{
@@ -81,7 +81,8 @@ pub(super) fn crazyflie(ground: &Ground<'_>, crazyflie: &Crazyflie, study: &mut 
     study.find(Finding::new(section, "bypass_difference", &[1, 2], what, difference, "m").asked(Asked::AtMost(0.0)));
     study.note(
         section,
-        "Features are computed by the firmware's adapter in every flight and by the same function from the logs for training;          `host-sim fly --pil` flies the same strokes through the firmware on the emulated microcontroller, bit for bit.",
+        "Features are computed by the firmware's adapter in every flight and by the same function from the logs for training; \
+         `host-sim fly --pil` flies the same strokes through the firmware on the emulated microcontroller, bit for bit.",
     );
     if let Err(reason) = &built.lane {
         study.note(section, &format!("No feedback lane: {reason}."));
@@ -114,8 +115,8 @@ fn without_model(
     study.note(
         section,
         &format!(
-            "Best constant shift of the references on validation strokes: {shift:.2} s. Iterative learning repeats each stroke {trials} times with other \
-             noise: gain {}, zero-phase filter {} s, both chosen on validation strokes. All else flies a stroke once.",
+            "Best constant shift of the references on validation strokes: {shift:.2} s. Iterative learning repeats each stroke \
+             {trials} times with other noise: gain {}, zero-phase filter {} s, both chosen on validation strokes. All else flies a stroke once.",
             chosen.1.gain, chosen.1.smoothing_s
         ),
     );

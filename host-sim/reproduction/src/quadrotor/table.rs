@@ -1,7 +1,7 @@
 //! Table I and Fig. 3: 12 against 36 inputs, everything else identical.
 //!
-//! *in* the predecessor's loop and training logs; *out* reductions over five trajectories, paths, delays; *never* a difference between the two
-//! trainings but the list of inputs; *source* Zhou 2017, section V-B and C.
+//! *in* the predecessor's loop and training logs; *out* reductions over five trajectories, paths, delays; *never* a difference
+//! between the two trainings but the list of inputs; *source* Zhou 2017, section V-B and C.
 
 use impromptu_model_export::FloatNetwork;
 use impromptu_report::{
@@ -133,11 +133,16 @@ pub(super) fn run(ground: &Ground<'_>, study: &mut Study) -> anyhow::Result<Netw
     study.note(
         SECTION,
         &format!(
-            "The predecessor's loop, 4 x 128 ReLU, one network for all six references, held for 0.15 s, no noise. 36 inputs: positions relative to the \
-             measured one, output added to the desired one, as in the paper. 12 inputs: relative to {}, output added to {}, the best of four choices on \
-             validation strokes (next section); training does not depend on it. The five trajectories are this project's own: the paper's are not \
-             published but for the letters. Its 45 % are of a real vehicle that was trained on three growing tones; here air and sensors are still and the \
-             training signal is rich. What the paper's signal does to the same network stands under \u{201c}Training signals\u{201d}.",
+            "The predecessor's loop, 4 x 128 ReLU, one network for all six references, held for 0.15 s, no noise. 36 inputs: \
+             positions relative to the \
+             measured one, output added to the desired one, as in the paper. 12 inputs: relative to {}, output added to {}, the \
+             best of four choices on \
+             validation strokes (next section); training does not depend on it. The five trajectories are this project's own: \
+             the paper's are not \
+             published but for the letters. Its 45 % are of a real vehicle that was trained on three growing tones; here air \
+             and sensors are still and the \
+             training signal is rich. What the paper's signal does to the same network stands under \u{201c}Training \
+             signals\u{201d}.",
             networks.origins.0.word(),
             networks.origins.1.word()
         ),

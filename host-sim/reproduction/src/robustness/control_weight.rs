@@ -1,8 +1,8 @@
 //! What robustness costs: the control weight of the feedback lane swept.
 //!
-//! *in* a loop with its models, dithered logs; *out* margins and reductions of each design, and the limit at the same control weight; *never* a choice
-//! of a design (that is made on validation flights), nor a lane that the guard saved; *source* Doyle, "Guaranteed margins for LQG regulators"
-//! (1978): there are none.
+//! *in* a loop with its models, dithered logs; *out* margins and reductions of each design, and the limit at the same control
+//! weight; *never* a choice of a design (that is made on validation flights), nor a lane that the guard saved; *source* Doyle,
+//! "Guaranteed margins for LQG regulators" (1978): there are none.
 
 use impromptu_firmware::{
     adapter::Lanes,
@@ -32,7 +32,8 @@ pub struct Design {
     pub margins: Margins,
     /// Mean and worst reduction over the strokes at each of [`DELAYS`], both lanes, per cent.
     pub reductions: [(f64, f64); DELAYS.len()],
-    /// Root mean square of the position error that the linear-quadratic-Gaussian limit leaves at hover at the same control weight, m.
+    /// Root mean square of the position error that the linear-quadratic-Gaussian limit leaves at hover at the same control
+    /// weight, m.
     pub limit: Option<f64>,
 }
 

@@ -1,9 +1,9 @@
 //! The add-on on small single-input single-output loops (Zhou 2017, sections III and V).
 //!
 //! ```text
-//! loop ──► tones ──► run ──► rows (features, target) ──► network (Levenberg-Marquardt, f64) ──► firmware kernel (f32, int16, int8)
-//!  │                                                          │                                       │
-//!  └──► exact law ─────────────────► simulation ◄─────────────┴───────────────────────────────────────┘
+//! loop ──► tones ──► run ──► rows (features, target) ──► network (Levenberg-Marquardt) ──► firmware kernel (f32, int16, int8)
+//!  │                                                          │                                  │
+//!  └──► exact law ─────────────────► simulation ◄─────────────┴──────────────────────────────────┘
 //! ```
 //!
 //! - *in*: a plant, its desired trajectory, a seed.

@@ -1,11 +1,12 @@
 //! Real flights: what a learned window would gain, as a model of the loop predicts it.
 //!
-//! *in* logs of horizontal position and set-point; *out* for each flight the error as measured, as the model repeats it, and as the model predicts
-//! it with a learned window and with a pure time shift; *never* a flight of the family that is predicted, nor a copy of one under another name, in
-//! what is learned: model, window, shift and penalty come from the other families.
+//! *in* logs of horizontal position and set-point; *out* for each flight the error as measured, as the model repeats it, and as
+//! the model predicts it with a learned window and with a pure time shift; *never* a flight of the family that is predicted, nor
+//! a copy of one under another name, in what is learned: model, window, shift and penalty come from the other families.
 //!
-//! What it is worth: the error with an add-on is a model's, nothing was flown. The model misses the measured flight by [`Prediction::misfit`]; an
-//! improvement that leaves less error than that is not shown. [`Prediction::cautious`] adds the misfit to the predicted error.
+//! What it is worth: the error with an add-on is a model's, nothing was flown. The model misses the measured flight by
+//! [`Prediction::misfit`]; an improvement that leaves less error than that is not shown. [`Prediction::cautious`] adds the misfit
+//! to the predicted error.
 
 use impromptu_sim::columns::{Table, TableError};
 use rayon::prelude::*;
