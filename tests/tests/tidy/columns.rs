@@ -30,7 +30,7 @@ fn no_file_is_too_long() {
     let long: Vec<String> = files
         .iter()
         .map(|(path, text)| (path.strip_prefix(&top).unwrap(), text.lines().count()))
-        .filter(|(path, lines)| *lines > LINES)
+        .filter(|(_, lines)| *lines > LINES)
         .map(|(path, lines)| format!("{}: {lines} lines", path.display()))
         .collect();
     assert!(long.is_empty(), "over {LINES} lines:\n{}", long.join("\n"));

@@ -116,7 +116,8 @@ fn without_model(
         section,
         &format!(
             "Best constant shift of the references on validation strokes: {shift:.2} s. Iterative learning repeats each stroke \
-             {trials} times with other noise: gain {}, zero-phase filter {} s, both chosen on validation strokes. All else flies a stroke once.",
+             {trials} times with other noise: gain {}, zero-phase filter {} s, both chosen on validation strokes. \
+             All else flies a stroke once.",
             chosen.1.gain, chosen.1.smoothing_s
         ),
     );

@@ -44,7 +44,9 @@ impl<'m> FaultyFlight<'m> {
             }
             self.on_the_way.push_back((tick.0.wrapping_add(self.command_delay), wanted));
         }
-        while let Some((_, wanted)) = self.on_the_way.pop_front_if(|(due, _)| *due <= tick.0) {
+        while self.on_the_way.front().is_some_and(|(due, _)| *due <= tick.0)
+            && let Some((_, wanted)) = self.on_the_way.pop_front()
+        {
             self.wanted = wanted;
         }
         let command = self.flight.attitude_step(&self.wanted, state);
