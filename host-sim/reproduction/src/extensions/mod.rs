@@ -35,4 +35,4 @@ pub fn add(study: &mut Study, seed: u64, logs: Option<&Path>) -> anyhow::Result<
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -41,4 +41,4 @@ pub fn run(settings: &Settings) -> anyhow::Result<Study> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

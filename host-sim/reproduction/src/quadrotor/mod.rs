@@ -59,4 +59,4 @@ pub fn run(settings: &QuadrotorSettings, command: &str, stage: &dyn Fn(&str)) ->
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
