@@ -51,7 +51,7 @@ pub struct LearnSettings {
     /// Number format of the model file: with float nothing is fine-tuned.
     pub precision: Precision,
     /// Whether logs in which the loop broke down are used as well.
-    pub broken: bool,
+    pub keep_broken: bool,
     /// Age of the logged measurements, s.
     pub measurement_delay_s: f64,
     /// Zero-phase smoothing of the logs, s.
@@ -68,7 +68,7 @@ impl LearnSettings {
             seed,
             labels: Labels::Corrections,
             precision: Precision::Int8,
-            broken: false,
+            keep_broken: false,
             measurement_delay_s: 0.0,
             smoothing_s: 0.0,
         }
@@ -181,7 +181,7 @@ pub fn learn(
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Learned, LearnError> {
     let recipe = &settings.recipe;
-    let (logs, broken) = if settings.broken { (logs.iter().collect(), Vec::new()) } else { sound(logs) };
+    let (logs, broken) = if settings.keep_broken { (logs.iter().collect(), Vec::new()) } else { sound(logs) };
     if logs.len() < 2 {
         return Err(LearnError::OneLog);
     }

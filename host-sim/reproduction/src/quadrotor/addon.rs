@@ -41,7 +41,7 @@ pub struct Learned {
 pub fn learn(recipe: &Recipe, closed_loop: &Loop, logs: &[FlightLog], labels: Labels) -> anyhow::Result<Learned> {
     let one = Recipe { weight_decays: vec![recipe.network.weight_decay], shares: vec![1.0], ..recipe.clone() };
     let pipeline = Pipeline::unjudged(&one, closed_loop, recipe.network.seed);
-    let settings = LearnSettings { labels, precision: Precision::Float, broken: true, ..pipeline.settings };
+    let settings = LearnSettings { labels, precision: Precision::Float, keep_broken: true, ..pipeline.settings };
     let maps = Pipeline { settings, ..pipeline }.learn(logs, &mut |_| {})?;
     Ok(Learned { recipe: recipe.clone(), maps })
 }
