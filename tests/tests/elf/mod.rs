@@ -20,7 +20,8 @@ const GOLDEN: &str = "elf.txt";
 /// A control tick: baseline loop, add-on with both lanes.
 const TICK: &str = "netduinoplus2::replay::step";
 /// The kernels in assembly that jump to their own labels by address.
-const LABELLED: [&str; 4] = ["cortex_m4::float_kernel", "cortex_m4::float_six_kernel", "cortex_m4::int8", "cortex_m4::int16"];
+const LABELLED: [&str; 4] =
+    ["cortex_m::float::float_kernel", "cortex_m::float::float_six_kernel", "cortex_m::integer::int8", "cortex_m::integer::int16"];
 
 /// A binary whose kernels can be followed.
 pub(crate) fn read(elf: &Path) -> Elf {
@@ -38,7 +39,9 @@ fn a_control_tick_reaches_no_panic_no_heap_no_recursion_and_no_f64() {
     let image = read(&board::build(None).unwrap());
     let graph = image.call_graph().unwrap();
     let proof = graph.from_roots(&[TICK]).unwrap();
-    for what in ["AxisState::step", "Network::run", "cortex_m4::int8", "portable::integer", "cortex_m4::float_kernel"] {
+    for what in
+        ["AxisState::step", "Network::run", "cortex_m::integer::int8", "portable::integer", "cortex_m::float::float_kernel"]
+    {
         assert!(proof.reached().iter().any(|name| name.contains(what)), "the tick has all lanes and kernels: {what}");
     }
     let findings = [proof.flaws(), proof.panics(), proof.allocations(), proof.indirect(), proof.double_precision()];

@@ -21,12 +21,13 @@ pub(crate) fn run<const WORDS: usize>(
     memory: &mut Memory<WORDS>,
 ) -> Result<(), Failure> {
     let file = read_file(cases, &mut memory.bulk, length)?;
-    let model = Model::from_bytes(file).map_err(|_| Failure("a model file is refused"))?;
+    let mut place = Model::EMPTY;
+    let model = Model::load_into(&mut place, file, &mut memory.scratch).map_err(|_| Failure("a model file is refused"))?;
     let mut header = [0; HEADER];
     cases.read_exact(&mut header).map_err(|_| ENDED)?;
     let Header { settings, .. } = Header::from_bytes(&header).map_err(|_| RECORDING)?;
     let mut flight = Flight::new(&settings).ok_or(RECORDING)?;
-    flight.attach(&model, Lanes::NONE).map_err(|_| Failure("a model does not fit its flight"))?;
+    flight.attach(model, Lanes::NONE).map_err(|_| Failure("a model does not fit its flight"))?;
     let mut tick = 0;
     loop {
         let mut record = [0; RECORD];

@@ -23,7 +23,8 @@ pub(crate) fn run<const WORDS: usize>(
     mark: &impl Fn(),
 ) -> Result<(), Failure> {
     let file = read_file(cases, &mut memory.bulk, length)?;
-    let model = Model::from_bytes(file).map_err(|_| Failure("a model file is refused"))?;
+    let mut place = Model::EMPTY;
+    let model = Model::load_into(&mut place, file, &mut memory.scratch).map_err(|_| Failure("a model file is refused"))?;
     let network = model.network().ok_or(Failure("a model file has no network"))?;
     let (mut row, mut result) = ([0.0; MAX_FEATURES], [0.0; MAX_OUTPUTS]);
     let (Some(row), Some(result)) = (row.get_mut(..inputs), result.get_mut(..results)) else { return Err(TOO_LARGE) };

@@ -53,7 +53,7 @@ mod app {
 
     #[embassy_executor::main]
     async fn main(spawner: Spawner) {
-        static MODEL: ConstStaticCell<Model<'static>> = ConstStaticCell::new(Model::VACANT);
+        static MODEL: ConstStaticCell<Model<'static>> = ConstStaticCell::new(Model::EMPTY);
         static ADD_ON: ConstStaticCell<ServoAddOn> = ConstStaticCell::new(AddOn::empty());
         static SCRATCH: ConstStaticCell<Scratch> = ConstStaticCell::new(Scratch::new());
         let (add_on, scratch) = (ADD_ON.take(), SCRATCH.take());

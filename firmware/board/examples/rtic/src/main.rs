@@ -58,7 +58,7 @@ mod app {
 
     #[init]
     fn init(cx: init::Context) -> (Shared, Local) {
-        static MODEL: ConstStaticCell<Model<'static>> = ConstStaticCell::new(Model::VACANT);
+        static MODEL: ConstStaticCell<Model<'static>> = ConstStaticCell::new(Model::EMPTY);
         static ADD_ON: ConstStaticCell<AddOn<'static, 1, 1, 1, 128>> = ConstStaticCell::new(AddOn::empty());
         static SCRATCH: ConstStaticCell<Scratch> = ConstStaticCell::new(Scratch::new());
         let (add_on, scratch) = (ADD_ON.take(), SCRATCH.take());
