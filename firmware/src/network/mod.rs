@@ -31,6 +31,8 @@ pub use scratch::{MAX_SCRATCH, Scratch};
 pub use shape::{INPUT_PADDING, ROWS, padded};
 pub use tanh::{TANH_CODE_ERROR, TANH_ERROR, TANH_INPUT_ONE, tanh, tanh_code};
 
+// Only where floats have no assembly: there is no heap for the larger variant.
+#[allow(clippy::large_enum_variant, reason = "without a heap")]
 #[derive(Debug)]
 enum Layers<'a> {
     Float(heapless::Vec<float::Layer<'a>, MAX_LAYERS>),

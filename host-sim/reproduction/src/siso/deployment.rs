@@ -59,7 +59,7 @@ pub fn model_file(
     let states = set.features.len().max(2);
     let description = Description {
         name: "single-input single-output".into(),
-        provenance: Provenance { software: "impromptu-lti".into(), ..Provenance::default() },
+        provenance: Provenance { software: "impromptu-reproduction".into(), ..Provenance::default() },
         signals: Signals {
             desired: vec![channel("output".into())],
             measured: (0..states).map(|index| channel(format!("state.{index}"))).collect(),
