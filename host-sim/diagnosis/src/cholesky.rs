@@ -1,8 +1,8 @@
 //! Symmetric positive definite systems: the factor behind every regression.
 //!
-//! *in* A and b; *out* x with A x = b; *never* a result of a matrix that is not positive definite; *source* Cholesky's decomposition as
-//! nalgebra does it, column by column, or in blocks whose products are nalgebra's: seven times as fast with 500 unknowns. The two differ in
-//! the last digits.
+//! *in* A and b; *out* x with A x = b; *never* a result of a matrix that is not positive definite; *source* Cholesky's
+//! decomposition as nalgebra does it, column by column, or in blocks whose products are nalgebra's: seven times as fast with 500
+//! unknowns. The two differ in the last digits.
 
 use nalgebra::{
     Cholesky, DMatrix, DVector, DefaultAllocator, Dim, Dyn, Matrix, OMatrix, RawStorage, Storage, allocator::Allocator,
@@ -43,8 +43,8 @@ impl Factor {
         Some(Self { cholesky: Cholesky::pack_dirty(matrix), scale: None })
     }
 
-    /// The factor of the matrix with its unknowns scaled to a diagonal of 1, to which `penalty` is added: the condition of the problem, not
-    /// of its units. An unknown with a diagonal of zero is not scaled: with a penalty it becomes zero.
+    /// The factor of the matrix with its unknowns scaled to a diagonal of 1, to which `penalty` is added: the condition of the
+    /// problem, not of its units. An unknown with a diagonal of zero is not scaled: with a penalty it becomes zero.
     pub fn of_unit_power(matrix: &DMatrix<f64>, penalty: f64) -> Option<Self> {
         let scale = matrix.diagonal().map(|power| if power > 0.0 { power.sqrt().recip() } else { 1.0 });
         let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |row, column| {
@@ -80,7 +80,8 @@ impl Factor {
         DMatrix::from_fn(inverse.nrows(), inverse.ncols(), |row, column| inverse[(row, column)] * scale[row] * scale[column])
     }
 
-    /// The least of what the elimination divides by; where the exact one is zero, rounding can leave a tiny one, whose solution is noise.
+    /// The least of what the elimination divides by; where the exact one is zero, rounding can leave a tiny one, whose solution
+    /// is noise.
     pub fn smallest_pivot(&self) -> f64 {
         let diagonal = self.cholesky.l_dirty().diagonal();
         diagonal.iter().fold(f64::INFINITY, |least, root| least.min(*root)).powi(2)

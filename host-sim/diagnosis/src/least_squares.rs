@@ -1,8 +1,8 @@
 //! Least squares by normal equations: the one regression.
 //!
-//! *in* rows one at a time, blocks of them, or a whole table, for one target or several; *out* sums of products, coefficients, and the
-//! covariance of what was found; *never* coefficients of columns that depend on each other; *source* Ljung, "System Identification", 2nd ed.,
-//! 7.3; penalties: Hoerl and Kennard, "Ridge regression", 1970.
+//! *in* rows one at a time, blocks of them, or a whole table, for one target or several; *out* sums of products, coefficients,
+//! and the covariance of what was found; *never* coefficients of columns that depend on each other; *source* Ljung, "System
+//! Identification", 2nd ed., 7.3; penalties: Hoerl and Kennard, "Ridge regression", 1970.
 
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
@@ -68,8 +68,8 @@ impl Regression {
         self.rows += 1;
     }
 
-    /// Many equations at once, as products of matrices: `block` has one *column* for each row of the regression, in the order of memory,
-    /// `targets` is `rows × targets`; each equation counts with its weight, 1 without weights.
+    /// Many equations at once, as products of matrices: `block` has one *column* for each row of the regression, in the order of
+    /// memory, `targets` is `rows × targets`; each equation counts with its weight, 1 without weights.
     ///
     /// # Panics
     /// If shapes do not fit together.
@@ -114,8 +114,8 @@ impl Regression {
         (self.squares[target] - explained + coefficients.dot(&(gram * coefficients))).max(0.0)
     }
 
-    /// The solution for the first target, with its covariance; `penalty` is relative to each column's own mean square. `None` if the columns
-    /// depend on each other.
+    /// The solution for the first target, with its covariance; `penalty` is relative to each column's own mean square. `None` if
+    /// the columns depend on each other.
     pub fn solve(&self, penalty: f64) -> Option<Solution> {
         let inverse = Factor::of_unit_power(&self.gram, penalty)?.inverse();
         let coefficients = &inverse * self.cross.column(0);

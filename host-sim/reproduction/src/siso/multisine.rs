@@ -1,7 +1,7 @@
 //! Sums of sines at random frequencies: signals to train on, and others of the same kind to test with.
 //!
-//! *in* a band, a number of tones, a seed; *out* a signal; *never* a tone outside of the band; *source* the tones and the smooth step are
-//! those of the trajectories, here for one dimensionless signal.
+//! *in* a band, a number of tones, a seed; *out* a signal; *never* a tone outside of the band; *source* the tones and the smooth
+//! step are those of the trajectories, here for one dimensionless signal.
 
 use impromptu_sim::trajectory::tones::{self, Tone, smooth_step};
 use rand::{RngExt, SeedableRng};
@@ -18,8 +18,8 @@ pub struct Multisine {
 }
 
 impl Multisine {
-    /// `count` tones, frequencies drawn evenly on a logarithmic scale from `band` (Hz), amplitudes up to `amplitude`, a constant up to
-    /// `offset`.
+    /// `count` tones, frequencies drawn evenly on a logarithmic scale from `band` (Hz), amplitudes up to `amplitude`, a constant
+    /// up to `offset`.
     pub fn random(count: usize, band: [f64; 2], amplitude: f64, offset: f64, seed: u64) -> Self {
         let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
         let [low, high] = band.map(libm::log);

@@ -1,7 +1,7 @@
 //! Sums of sinusoids (multisines) and the smooth step that fades them in and out.
 //!
-//! *in* tones and an argument; *out* the value and its first two derivatives; *never* a jump of any of them; *source* the quintic that goes from
-//! rest to rest with the least jerk: Flash and Hogan, Journal of Neuroscience 5 (1985).
+//! *in* tones and an argument; *out* the value and its first two derivatives; *never* a jump of any of them; *source* the quintic
+//! that goes from rest to rest with the least jerk: Flash and Hogan, Journal of Neuroscience 5 (1985).
 
 use libm::{cos, sin};
 
