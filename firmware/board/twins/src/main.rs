@@ -2,7 +2,7 @@
 //!
 //! - in, on a board: `cases.bin` in the folder where the emulator was started; out: `outputs.bin` beside it and one line of JSON
 //!   that counts. The exit code is 0 if every case was run, 1 if not; a HardFault aborts the emulator
-//! - in and out, in WebAssembly: the [letterbox]
+//! - in and out, in WebAssembly: the `letterbox`
 //!
 //! Which machine: `build.rs` and `tests/src/cores.rs`, which builds and starts this.
 #![cfg_attr(target_os = "none", no_std, no_main)]

@@ -27,7 +27,7 @@ pub enum Event {
     Setpoint(Setpoint),
     /// The adapter's lanes are switched.
     Lanes(Lanes),
-    /// [`Flight::excite`], m, world ENU.
+    /// [`Flight::set_dither`], m, world ENU.
     Dither(Vector3<f32>),
     /// The flight ends.
     End {
