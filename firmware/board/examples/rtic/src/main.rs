@@ -13,6 +13,8 @@
 //!
 //! `cargo run -p impromptu-example-rtic --target thumbv7em-none-eabihf --profile firmware` (needs qemu-system-arm).
 #![cfg_attr(target_os = "none", no_std, no_main)]
+// RTIC hands a job back that it cannot take.
+#![allow(clippy::result_large_err)]
 
 #[cfg(target_os = "none")]
 #[path = "../../../../examples/one_axis/servo.rs"]
