@@ -1,23 +1,29 @@
 /**
- * Impromptu for C: a learned add-on that corrects the references of a control loop, and the quadrotor loop that is its first user.
+ * Impromptu for C: a learned add-on that corrects the references of a control loop, and the quadrotor loop that is its first
+ * user.
  *
  * C99 and C++. Made from firmware/c-abi/src by a test; do not edit.
  *
  *   desired trajectory (pushed ahead) --> adapter --> reference --> your loop
  *   measured state ------------------------^
  *
- * Memory   The caller owns all of it. An object is created in memory of its type, static or not, and needs no destruction: forget it or
+ * Memory   The caller owns all of it. An object is created in memory of its type, static or not, and needs no destruction: forget
+ * it or
  *          create it anew. Memory that never held an object must be zeroed (as static memory is), so that use before creation is
- *          found. An object must not be moved or copied. A model file's bytes must outlive the model, the model what was created from it.
- * Threads  No globals, no locks, no clock, no allocation. Calls with different objects may run at the same time. Calls with the same
- *          object must not, but for a model, which is only read after its creation. So a control interrupt may call the adapter while
- *          a task of lower priority is in impromptu_job_run. Job and inference are copied; hand them over as you hand over other data.
+ *          found. An object must not be moved or copied. A model file's bytes must outlive the model, the model what was created
+ *          from it.
+ * Threads  No globals, no locks, no clock, no allocation. Calls with different objects may run at the same time. Calls with the
+ * same
+ *          object must not, but for a model, which is only read after its creation. So a control interrupt may call the adapter
+ *          while a task of lower priority is in impromptu_job_run. Job and inference are copied; hand them over as you hand over
+ *          other data.
  * Time     Ticks are arguments. A reference tick is a period of the loop's references; call once for each, in order. After a
  *          gap the adapter starts its histories anew.
  * Units    SI and radians. World frame ENU (z up), body frame FLU, Hamilton quaternion body to world.
- * Errors   Every call that can fail returns an impromptu_status. NULL, misaligned pointers, objects that were not created and counts
- *          that differ are found; pointers to too few values are not. Nothing unwinds or prints. On a microcontroller no part of the
- *          library can panic: else the linker would miss the symbol impromptu_can_panic.
+ * Errors   Every call that can fail returns an impromptu_status. NULL, misaligned pointers, objects that were not created and
+ * counts
+ *          that differ are found; pointers to too few values are not. Nothing unwinds or prints. On a microcontroller no part of
+ *          the library can panic: else the linker would miss the symbol impromptu_can_panic.
  */
 
 #ifndef IMPROMPTU_H
