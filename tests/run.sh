@@ -164,7 +164,8 @@ board_lints() {
     # shellcheck disable=SC2086 # flags
     {
         flags="--bins --locked --target $target --target-dir $firmware"
-        (cross clippy $(packages $libraries impromptu-c-abi impromptu-planted impromptu-twins) --lib $flags --profile firmware -- -D warnings)
+        (cross clippy $(packages $libraries impromptu-c-abi impromptu-planted impromptu-twins) --lib $flags --profile firmware \
+            -- -D warnings)
         (cross clippy --package impromptu-board --lib $flags --profile board -- -D warnings)
         (cross clippy --manifest-path tests/peers/Cargo.toml --package impromptu-mcu-benchmark $flags --profile firmware \
             -- -D warnings)
