@@ -26,8 +26,8 @@ fn every_use_runs_down_the_layers_that_the_crates_first_page_states() {
     }
 }
 
-/// Whoever adds the library gets no board with it: nothing of a Cortex-M, of a microcontroller or of a debugger in its tree, and no
-/// build script that touches the linker.
+/// Whoever adds the library gets no board with it: nothing of a Cortex-M, of a microcontroller or of a debugger in its tree, and
+/// no build script that touches the linker.
 #[test]
 fn the_library_knows_no_board() {
     let tree = Command::new(env!("CARGO"))
