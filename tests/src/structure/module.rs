@@ -20,6 +20,13 @@ pub(super) struct Import {
     pub(super) path: Vec<String>,
 }
 
+impl Import {
+    /// Whether it brings in `name` from somewhere else; `use a::{self}` and `use a` alone lead nowhere.
+    pub(super) fn brings(&self, name: &str) -> bool {
+        self.name.as_deref() == Some(name) && self.path.first().is_none_or(|first| first != name)
+    }
+}
+
 /// A file with its modules below it.
 #[derive(Debug, Default)]
 pub(super) struct Module {

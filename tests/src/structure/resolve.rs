@@ -3,7 +3,7 @@
 //! *in* a module and a path that it uses; *out* the defining file; *never* a file of another crate; *source* Rust's rules for
 //! paths, as far as they matter here: `crate`, `self`, `super`, modules, items, names that a `use` brings in.
 
-use super::module::Module;
+use super::module::{Import, Module};
 
 /// More steps than any chain of re-exports has: two globs that hand on each other's names would never end.
 const DEPTH: usize = 16;
@@ -37,34 +37,18 @@ fn resolve(root: &Module, from: &str, path: &[String], depth: usize) -> Option<S
     if here.defined.contains(name) {
         return Some(here.path.clone());
     }
-    for import in &here.imports {
-        match &import.name {
-            // A name may have the name of the crate or module it comes from.
-            Some(known)
-                if known == name && import.path.first() != Some(name)
-                    || import.path.len() > 1 && import.name.as_ref() == Some(name) =>
-            {
-                let whole: Vec<String> = import.path.iter().chain(after).cloned().collect();
-                return resolve(root, &here.path, &whole, depth);
-            }
-            None => {
-                let whole: Vec<String> = import.path.iter().chain(rest).cloned().collect();
-                if let Some(found) = resolve(root, &here.path, &whole, depth) {
-                    return Some(found);
-                }
-            }
-            _ => {}
-        }
+    // What the module imports by that name, else what it imports whole.
+    let whole = |import: &Import, rest: &[String]| import.path.iter().chain(rest).cloned().collect::<Vec<_>>();
+    if let Some(import) = here.imports.iter().find(|import| import.brings(name)) {
+        return resolve(root, &here.path, &whole(import, after), depth);
     }
-    None
+    let globs = here.imports.iter().filter(|import| import.name.is_none());
+    globs.map(|import| whole(import, rest)).find_map(|path| resolve(root, &here.path, &path, depth))
 }
 
 /// Whether a module knows a name by itself.
 fn knows(module: &Module, name: &str) -> bool {
     module.children.iter().any(|child| child.name() == name)
         || module.defined.contains(name)
-        || module
-            .imports
-            .iter()
-            .any(|import| import.name.as_deref() == Some(name) && import.path.first().is_none_or(|first| first != name))
+        || module.imports.iter().any(|import| import.brings(name))
 }
