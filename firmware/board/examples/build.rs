@@ -1,9 +1,9 @@
-//! Gives the linker the memory map of the microcontroller and cortex-m-rt's script.
+//! Gives the linker the memory map of the microcontroller and cortex-m-rt's script; the same for both examples.
 
 use std::{env, error::Error, fs, path::Path};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-changed=../build.rs");
     if env::var("CARGO_CFG_TARGET_OS")? != "none" {
         return Ok(());
     }
