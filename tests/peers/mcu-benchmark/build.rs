@@ -1,9 +1,11 @@
 //! Links the benchmark as the firmware is linked, and embeds the networks that `cargo mcu` prepared.
 
-use std::{env, error::Error, ffi::OsString, fs, path::Path};
+use std::{collections::BTreeMap, env, error::Error, fs, path::Path};
 
 /// Names a folder with one file for each network, in the form of its kernels.
 const IMAGES_VARIABLE: &str = "IMPROMPTU_MCU_IMAGES";
+/// Suits every section of a model file.
+const ALIGNMENT: usize = 16;
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=build.rs");
@@ -17,27 +19,34 @@ fn main() -> Result<(), Box<dyn Error>> {
     fs::copy(&memory, Path::new(&out).join("memory.x")).map_err(|error| format!("cannot copy {}: {error}", memory.display()))?;
 
     println!("cargo::rerun-if-env-changed={IMAGES_VARIABLE}");
-    let mut names: Vec<OsString> = Vec::new();
+    let mut images = BTreeMap::new();
     if let Some(folder) = env::var_os(IMAGES_VARIABLE).filter(|folder| !folder.is_empty()) {
         println!("cargo::rerun-if-changed={}", Path::new(&folder).display());
         for entry in fs::read_dir(&folder).map_err(|error| format!("{IMAGES_VARIABLE}: {error}"))? {
             let entry = entry?;
             println!("cargo::rerun-if-changed={}", entry.path().display());
-            fs::copy(entry.path(), Path::new(&out).join(entry.file_name()))?;
-            names.push(entry.file_name());
+            images.insert(entry.file_name(), fs::read(entry.path())?);
         }
     }
-    // The order is the numbering.
-    names.sort();
-    let mut list = String::from("static IMAGES: &[&Aligned<[u8]>] = &[\n");
-    for name in &names {
-        let name = name.to_str().ok_or("an image's name is not Unicode")?;
-        list += &format!("    &Aligned(*include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{name}\"))),\n");
-        if name.starts_with("s8-") {
-            println!("cargo::rustc-cfg=peers");
-        }
+    if images.keys().any(|name| name.as_encoded_bytes().starts_with(b"s8-")) {
+        println!("cargo::rustc-cfg=peers");
     }
-    fs::write(Path::new(&out).join("images.rs"), list + "];\n")?;
+    // One static: many would be laid out in the order of their hashes, in which the checkout's path takes part, and cycles
+    // depend on addresses. The order of the names is the numbering.
+    let (mut bytes, mut ranges) = (Vec::new(), Vec::new());
+    for image in images.into_values() {
+        ranges.push(bytes.len()..bytes.len() + image.len());
+        bytes.extend(image);
+        bytes.resize(bytes.len().next_multiple_of(ALIGNMENT), 0);
+    }
+    fs::write(Path::new(&out).join("images.bin"), bytes)?;
+    fs::write(
+        Path::new(&out).join("images.rs"),
+        format!(
+            "static BYTES: &Aligned<[u8]> = &Aligned(*include_bytes!(concat!(env!(\"OUT_DIR\"), \"/images.bin\")));\n\
+             static IMAGES: &[core::ops::Range<usize>] = &{ranges:?};\n"
+        ),
+    )?;
 
     println!("cargo::rustc-link-search={out}");
     println!("cargo::rustc-link-arg-bins=-Tlink.x");

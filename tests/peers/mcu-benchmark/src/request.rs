@@ -36,7 +36,8 @@ pub(crate) fn run() -> Result<(), &'static str> {
     request.read_exact(&mut header).map_err(|_| "request.bin has no header")?;
     let word = |at: usize| u32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]]);
     // The compiler shall not evaluate an embedded network in the board's place.
-    let flash: &'static [u8] = &black_box(IMAGES).get(word(4) as usize).ok_or("no such image in this binary")?.0;
+    let range = IMAGES.get(word(4) as usize).ok_or("no such image in this binary")?.clone();
+    let flash: &'static [u8] = black_box(BYTES).0.get(range).ok_or("an image out of range")?;
     let image = if word(8) == 1 {
         IMPROMPTU_WEIGHTS.init_with(FileBuffer::new).keep(flash).ok_or("the weights do not fit into the RAM for weights")?
     } else {
