@@ -58,11 +58,19 @@ pub enum Status {
     Rate = 27,
     /// The model is refused for a reason that this version of the library cannot name.
     Refused = 28,
+    /// The bounds of the correction say too little: a limit and a rate for each reference channel are needed.
+    Caps = 29,
+    /// A measured number is NaN or infinite: the tick was done with the last good sample.
+    BadSample = 30,
+    /// There is no desired trajectory: the tick was done, the loop holds what was desired last or where it is.
+    NoTrajectory = 31,
+    /// The preview is full: as many samples as it keeps lie ahead of the last reference tick.
+    Full = 32,
 }
 
 impl Status {
     /// Every status.
-    pub const ALL: [Self; 23] = [
+    pub(crate) const ALL: [Self; 27] = [
         Self::Ok,
         Self::Null,
         Self::Misaligned,
@@ -86,6 +94,10 @@ impl Status {
         Self::Preview,
         Self::Rate,
         Self::Refused,
+        Self::Caps,
+        Self::BadSample,
+        Self::NoTrajectory,
+        Self::Full,
     ];
 
     /// The status in words, with what to do.
@@ -114,6 +126,10 @@ impl Status {
             Self::Preview => c"the model looks further than the preview keeps",
             Self::Rate => c"the model was trained for another rate of the references",
             Self::Refused => c"the model is refused",
+            Self::Caps => c"bounds of the correction are missing: give each reference channel a limit and a rate",
+            Self::BadSample => c"a measured number is NaN or infinite: the last good sample stood in",
+            Self::NoTrajectory => c"there is no desired trajectory: push one; until then the loop holds",
+            Self::Full => c"the preview is full: push no further ahead",
         }
     }
 }
@@ -136,6 +152,7 @@ impl From<Refusal> for Status {
             Refusal::Signal { .. } => Self::Signals,
             Refusal::Preview { .. } => Self::Preview,
             Refusal::Rate { .. } => Self::Rate,
+            Refusal::Cap { .. } => Self::Caps,
             _ => Self::Refused,
         }
     }

@@ -6,7 +6,7 @@
 use core::num::NonZeroU32;
 
 use impromptu_firmware::{
-    AddOn,
+    AddOn, Caps,
     adapter::{Adapter, Inference, Job, Lanes},
     model::{MAX_AXES, Model, Refusal},
     network::Scratch,
@@ -14,6 +14,7 @@ use impromptu_firmware::{
 use nalgebra::{Matrix3, Vector3};
 
 use crate::{
+    caps,
     control::{AttitudeLoop, Mixer, PositionLoop, ThrustVector},
     quadrotor::{self, DESIRED, MEASURED, REFERENCE},
     types::{MotorCommand, Reference, Setpoint, State, Tick},
@@ -89,6 +90,40 @@ pub struct Flight<'m> {
     wanted: ThrustVector,
     reference: Reference,
     dither: Vector3<f32>,
+    clock: Clock,
+}
+
+/// Reference ticks of control ticks, which wrap: after 99 days at 500 Hz the next reference tick is still the next one.
+#[derive(Clone, Copy, Debug)]
+struct Clock {
+    /// Control tick seen last,
+    control: u32,
+    /// control ticks since its reference tick,
+    phase: u32,
+    /// and the number of that one.
+    reference: i32,
+    running: bool,
+}
+
+impl Clock {
+    /// Nothing seen yet: all zeros.
+    const EMPTY: Self = Self { control: 0, phase: 0, reference: 0, running: false };
+
+    /// The clock at a control tick. The first one that is seen is as many ticks after reference tick 0 as its number says.
+    fn at(&self, tick: u32, divisor: NonZeroU32) -> Self {
+        if !self.running {
+            return Self { control: tick, phase: tick % divisor, reference: (tick / divisor) as i32, running: true };
+        }
+        let ahead = tick.wrapping_sub(self.control) as i32;
+        let divisor = i32::try_from(divisor.get()).unwrap_or(i32::MAX);
+        let since = (self.phase as i32).wrapping_add(ahead);
+        Self {
+            control: tick,
+            phase: since.rem_euclid(divisor) as u32,
+            reference: self.reference.wrapping_add(since.div_euclid(divisor)),
+            running: true,
+        }
+    }
 }
 
 impl<'m> Flight<'m> {
@@ -104,6 +139,7 @@ impl<'m> Flight<'m> {
             },
             reference: Reference::ORIGIN,
             dither: Vector3::new(0.0, 0.0, 0.0),
+            clock: Clock::EMPTY,
         }
     }
 
@@ -111,6 +147,11 @@ impl<'m> Flight<'m> {
     pub fn new(settings: &Settings) -> Option<Self> {
         let mut flight = Self::empty();
         flight.configure(settings).then_some(flight)
+    }
+
+    /// Whether [`Flight::configure`] takes these settings.
+    pub fn is_flyable(settings: &Settings) -> bool {
+        Loops::new(settings).is_some()
     }
 
     /// Back on the ground with these settings; `false`, and nothing changes, if the airframe cannot be mixed. An add-on stays, as
@@ -136,6 +177,7 @@ impl<'m> Flight<'m> {
         }
         self.add_on.reset(0);
         (self.wanted, self.reference, self.dither) = (ThrustVector::NONE, Reference::ORIGIN, Vector3::zeros());
+        self.clock = Clock::EMPTY;
     }
 
     /// Puts an add-on before the configured loops, with the lanes given, in the place of the one that was there. The trajectory
@@ -146,8 +188,10 @@ impl<'m> Flight<'m> {
     /// settings has a rate of 0.
     pub fn attach(&mut self, model: &'m Model<'m>, lanes: Lanes) -> Result<(), Refusal> {
         Self::accepts(model, &self.stage.loops().map_or(Rates::NONE, |loops| loops.rates))?;
+        let sums = self.stage.loops().map(|loops| caps::sums(loops.position.gains()));
         let (adapter, _) = self.add_on.parts();
-        adapter.load(model, &quadrotor::signals());
+        let caps = Caps { channels: &caps::CHANNELS, sums: sums.as_ref().map_or(&[], |sums| sums) };
+        adapter.load(model, &quadrotor::signals(), &caps);
         adapter.defer();
         adapter.switch(lanes);
         self.stage = match core::mem::replace(&mut self.stage, Stage::Empty) {
@@ -174,7 +218,8 @@ impl<'m> Flight<'m> {
     /// As [`Flight::attach`].
     #[inline(never)]
     pub fn accepts(model: &Model<'_>, rates: &Rates) -> Result<(), Refusal> {
-        QuadrotorAddOn::check(model, quadrotor::signals(), rates.reference_hz())
+        let caps = Caps { channels: &caps::CHANNELS, sums: &[] };
+        QuadrotorAddOn::check(model, quadrotor::signals(), rates.reference_hz(), &caps)
     }
 
     /// The add-on, if there is one.
@@ -208,7 +253,7 @@ impl<'m> Flight<'m> {
     /// Reference tick of a control tick.
     pub fn reference_tick(&self, tick: Tick) -> i32 {
         let divisor = self.stage.loops().map_or(NonZeroU32::MIN, |loops| loops.position_divisor);
-        (tick.0 / divisor) as i32
+        self.clock.at(tick.0, divisor).reference
     }
 
     /// Where the vehicle is desired to be at a control tick, m, world ENU; of the position loop's last tick.
@@ -267,10 +312,11 @@ impl<'m> Flight<'m> {
             Stage::Baseline(loops) => (loops, false),
             Stage::Adapted(loops) => (loops, true),
         };
-        if !tick.0.is_multiple_of(loops.position_divisor.get()) {
+        self.clock = self.clock.at(tick.0, loops.position_divisor);
+        if self.clock.phase != 0 {
             return (None, false);
         }
-        let reference_tick = (tick.0 / loops.position_divisor) as i32;
+        let reference_tick = self.clock.reference;
         let (reference, released) = if corrected {
             adapted(&mut self.add_on, reference_tick, state, job, path)
         } else {

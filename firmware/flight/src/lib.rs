@@ -23,6 +23,7 @@
 //! | 1 | `types` | states, setpoints, references, motor commands |
 //! | 2 | `control` | the baseline loop: position loop, attitude loop, mixer |
 //! | 2 | `quadrotor` | which channels a quadrotor's models map between |
+//! | 3 | `caps` | what corrections of a quadrotor's references may be |
 //! | 3 | `settings` | vehicle constants, gains and rates |
 //! | 4 | `flight` | the baseline loop with the add-on before it |
 //! | 4 | `link` | messages as bytes which may be lost, damaged or delayed |
@@ -37,6 +38,7 @@
 
 pub mod application;
 pub mod autopilot;
+pub mod caps;
 pub mod control;
 pub mod flight;
 pub mod link;

@@ -134,6 +134,11 @@ pub enum Refusal {
         /// Rate of the application, Hz.
         application: f32,
     },
+    /// The application's bounds of the correction are none.
+    Cap {
+        /// What of them.
+        what: &'static str,
+    },
 }
 
 impl fmt::Display for Refusal {
@@ -206,6 +211,11 @@ impl fmt::Display for Refusal {
             Self::Rate { model, application } => {
                 write!(f, "trained for references at {model} Hz, the application runs {application} Hz")
             }
+            Self::Cap { what } => write!(
+                f,
+                "the application's bounds of the correction are not complete ({what}): give each reference channel a limit and a \
+                 rate that the vehicle or machine bears"
+            ),
         }
     }
 }

@@ -68,6 +68,20 @@ pub struct GuardSettings {
     pub oscillation_s: f32,
     /// The feedback lane stays off after this many trips by oscillation, until it is armed again: each return would swing again.
     pub oscillation_trips: u16,
+    /// The feedback lane trips when the RMS of the error is more than this factor of what the loop's nominal response to the
+    /// desired trajectory leads to, beyond the floor.
+    pub astray_factor: f32,
+    /// The same factor where the network lane has acted in full for long: it leaves but a share of that error.
+    pub astray_share: f32,
+    /// An error below this many times the model's validated RMS is not astray.
+    pub astray_floor: f32,
+    /// What the nominal response leads to is forgotten with this time constant, s: the loop may be later than nominal.
+    pub astray_s: f32,
+    /// The feedback lane stays off after this many trips astray, until it is armed again, or until the error turns out as bad
+    /// without it.
+    pub astray_trips: u16,
+    /// What the error was without the feedback lane is forgotten with this time constant, s.
+    pub disturbance_s: f32,
 }
 
 impl GuardSettings {
@@ -98,6 +112,12 @@ impl GuardSettings {
         oscillation_power: 0.0,
         oscillation_s: 0.0,
         oscillation_trips: 0,
+        astray_factor: 0.0,
+        astray_share: 0.0,
+        astray_floor: 0.0,
+        astray_s: 0.0,
+        astray_trips: 0,
+        disturbance_s: 0.0,
     };
 
     const DEFAULT: Self = Self {
@@ -123,6 +143,12 @@ impl GuardSettings {
         oscillation_power: 0.8,
         oscillation_s: 0.5,
         oscillation_trips: 1,
+        astray_factor: 1.5,
+        astray_share: 0.3,
+        astray_floor: 2.0,
+        astray_s: 1.0,
+        astray_trips: 1,
+        disturbance_s: 30.0,
     };
 }
 

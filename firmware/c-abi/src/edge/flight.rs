@@ -1,6 +1,6 @@
 //! The flight stack, from C.
 
-use core::{ffi::c_int, ptr};
+use core::ffi::c_int;
 
 use impromptu_firmware::{adapter::Lanes, model::Model, network::Scratch};
 use impromptu_flight::flight::Flight;
@@ -25,11 +25,13 @@ pub unsafe extern "C" fn impromptu_flight_create(
 ) -> Status {
     // SAFETY: the module's rules.
     unsafe {
-        create::<Stack>(flight, size, |stack| {
+        create::<Stack>(flight, size, |made| {
             let settings = input(settings)?.checked().ok_or(Status::Settings)?;
-            let flight = ptr::addr_of_mut!((*stack).flight);
-            flight.write(EMPTY);
-            if (*flight).configure(&settings) { Ok(()) } else { Err(Status::Settings) }
+            if !Flight::is_flyable(&settings) {
+                return Err(Status::Settings);
+            }
+            made.write(Stack { flight: EMPTY }).flight.configure(&settings);
+            Ok(())
         })
     }
 }

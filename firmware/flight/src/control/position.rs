@@ -65,6 +65,11 @@ impl PositionLoop {
         }
     }
 
+    /// Its gains.
+    pub fn gains(&self) -> &PositionGains {
+        &self.gains
+    }
+
     /// As it was made, in place.
     pub fn reset(&mut self) {
         (self.integral, self.yaw, self.heading, self.attitude) = (Vector3::zeros(), 0.0, Vector3::x(), Matrix3::identity());
