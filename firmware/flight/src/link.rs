@@ -33,7 +33,7 @@ use crc::{CRC_32_ISO_HDLC, Crc, Table};
 
 pub use counts::{Counts, Fault};
 pub use message::{Command, Commands, Direction, Message, Report, Reports};
-pub use outcome::{ModelFault, Outcome, Reason};
+pub use outcome::{ModelFault, Outcome, Quantity, Reason};
 pub use port::{SendError, receive, send};
 pub use receiver::{Order, RECENT, Received, Receiver};
 pub use sender::{Sender, encode};
