@@ -101,11 +101,11 @@ enum impromptu_status
   IMPROMPTU_STATUS_NOT_CREATED = 4,
   // A count of channels differs from the signal table's, or exceeds IMPROMPTU_MAX_CHANNELS.
   IMPROMPTU_STATUS_COUNT = 5,
-  // A number is NaN or infinite.
+  // A number is NaN, infinite, or beyond what any vehicle has or does: 10 km, 400 m/s, 1000 m/s^2, 175 rad/s.
   IMPROMPTU_STATUS_NOT_FINITE = 6,
   // A name, unit or frame is not UTF-8.
   IMPROMPTU_STATUS_TEXT = 7,
-  // The settings are impossible: a rate that is not positive, or an airframe whose rotors cannot produce every moment.
+  // The settings are impossible: a number that no vehicle has, or an airframe whose rotors cannot produce every moment.
   IMPROMPTU_STATUS_SETTINGS = 8,
   // The model has no network, or the flight stack no model.
   IMPROMPTU_STATUS_NOTHING = 9,

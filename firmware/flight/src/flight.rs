@@ -389,3 +389,6 @@ fn desired(add_on: &QuadrotorAddOn<'_>, tick: i32) -> Reference {
     let [px, py, pz, vx, vy, vz, .., yaw] = add_on.desired(tick);
     quadrotor::reference(&[px, py, pz, vx, vy, vz], yaw)
 }
+
+#[cfg(test)]
+mod tests;
