@@ -446,14 +446,17 @@ impromptu_status impromptu_flight_attach(struct impromptu_flight *flight,
                                          int network,
                                          int feedback);
 
-// Appends the desired state of the next reference tick, as far ahead as impromptu_description.future says.
+// Appends the desired state of the next reference tick, as far ahead as impromptu_description.future says. One that is not
+// finite, or that no vehicle can be asked for, gives IMPROMPTU_STATUS_NOT_FINITE and is not stored: the next one is still that
+// of the same tick.
 impromptu_status impromptu_flight_push(struct impromptu_flight *flight, const struct impromptu_setpoint *setpoint);
 
 // Switches the network lane and the feedback lane on (not 0) or off.
 impromptu_status impromptu_flight_switch(struct impromptu_flight *flight, int network, int feedback);
 
-// One control tick, the network included. Ticks count from 0. A state that is not finite gives IMPROMPTU_STATUS_NOT_FINITE and
-// no command: what the motors then do is the caller's decision. Needs up to 4 KB of stack.
+// One control tick, the network included. Ticks count from 0. A state that is not finite, or that no vehicle can be in, gives
+// IMPROMPTU_STATUS_NOT_FINITE, no command, and changes nothing: a missed sample. What the motors then do is the caller's
+// decision. Needs up to 4 KB of stack.
 impromptu_status impromptu_flight_step(struct impromptu_flight *flight,
                                        struct impromptu_scratch *scratch,
                                        uint32_t tick,

@@ -10,7 +10,7 @@
 //! | nothing for [`Timeouts::motors_inertial_s`] | motors off, disarmed |
 //! | a state that is older than the newest | ignored |
 //! | a state from the future, or one that no vehicle is in | ignored and counted: one missed sample |
-//! | states of a sender that starts again in flight | heard when the old ones stayed away for 20 ms (attitude), 0.1 s (position) |
+//! | states of a sender that starts again in flight | heard 20 ms (attitude) and 0.1 s (position) after the last old one |
 //! | settings that no vehicle has, or of another control rate | refused by name; nothing changes |
 //! | a setpoint after a gap, a re-plan, a brake | no jump, see the table in `autopilot/course.rs` |
 //! | a setpoint that is stored already | ignored |

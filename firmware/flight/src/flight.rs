@@ -111,7 +111,8 @@ impl<'m> Flight<'m> {
         }
     }
 
-    /// A flight stack on the ground; `None` if no vehicle has these settings ([`Settings::check`] says why). The first setpoint is that of reference tick 0.
+    /// A flight stack on the ground; `None` if no vehicle has these settings ([`Settings::check`] says why). The first setpoint
+    /// is that of reference tick 0.
     pub fn new(settings: &Settings) -> Option<Self> {
         let mut flight = Self::empty();
         flight.configure(settings).then_some(flight)

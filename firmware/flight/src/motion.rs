@@ -1,8 +1,9 @@
 //! From one motion into another: how a vehicle comes to rest, and how it comes from one trajectory to the next.
 //!
 //! *in* setpoints and limits; *out* setpoints, as many seconds later as asked; *never* a jump of position or velocity, or more
-//! speed or acceleration beside the trajectory's own than the limits say; *source* polynomials of least degree between two ends (quintic Hermite, as in
-//! Flash and Hogan 1985); default limits of PX4 1.14 (`MPC_XY_CRUISE`, `MPC_ACC_HOR`, `MPC_JERK_MAX`).
+//! speed or acceleration beside the trajectory's own than the limits say; *source* polynomials of least degree between two ends
+//! (quintic Hermite; Flash and Hogan 1985 for the way from rest to rest); default limits of PX4 1.14
+//! (`MPC_XY_CRUISE`, `MPC_ACC_HOR`, `MPC_JERK_MAX`).
 
 use core::f32::consts::PI;
 
@@ -187,7 +188,9 @@ mod tests {
     }
 
     prop_compose! {
-        fn moving()(position in three(50.0), velocity in three(10.0), acceleration in three(3.0), yaw in -3.2f32..3.2) -> Setpoint {
+        fn moving()(
+            position in three(50.0), velocity in three(10.0), acceleration in three(3.0), yaw in -3.2f32..3.2
+        ) -> Setpoint {
             Setpoint { position, velocity, acceleration, yaw }
         }
     }

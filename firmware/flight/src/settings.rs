@@ -253,7 +253,8 @@ pub(crate) mod tests {
             settings.check().map_err(|refusal| refusal.what)
         };
         assert_eq!(GOOD.check(), Ok(()));
-        let cases: [(fn(&mut Settings), Setting); 24] = [
+        type Change = fn(&mut Settings);
+        let cases: [(Change, Setting); 24] = [
             (|s| s.airframe.mass = 0.0, Setting::Mass),
             (|s| s.airframe.mass = -1.0, Setting::Mass),
             (|s| s.airframe.mass = 1e38, Setting::Mass),
@@ -288,7 +289,9 @@ pub(crate) mod tests {
 
     proptest! {
         #[test]
-        fn no_bits_of_any_number_make_a_vehicle_that_cannot_hover(index in 0usize..32, bits in any::<u32>(), divisor in any::<u32>()) {
+        fn no_bits_of_any_number_make_a_vehicle_that_cannot_hover(
+            index in 0usize..32, bits in any::<u32>(), divisor in any::<u32>()
+        ) {
             let mut settings = GOOD;
             settings.rates.position_divisor = divisor % 40;
             *numbers(&mut settings)[index] = f32::from_bits(bits);

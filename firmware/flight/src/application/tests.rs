@@ -126,7 +126,8 @@ fn hover() -> impl Iterator<Item = Command<'static>> {
 
 #[test]
 fn settings_that_no_vehicle_has_are_refused_by_name_and_change_nothing() {
-    let cases: [(fn(&mut Settings), Setting); 10] = [
+    type Change = fn(&mut Settings);
+    let cases: [(Change, Setting); 10] = [
         (|s| s.rates.control_hz = 1e9, Setting::ControlRate),
         (|s| s.rates.control_hz = 5000.0, Setting::ControlRate),
         (|s| s.rates.control_hz = -500.0, Setting::ControlRate),
@@ -320,7 +321,9 @@ fn any_command() -> impl Strategy<Value = Command<'static>> {
         })
     };
     prop_oneof![
-        3 => (0u32..1000, three()).prop_map(|(tick, rates)| Command::Inertial(Inertial { tick, attitude: [0.0, 0.6, 0.8, 0.0], rates })),
+        3 => (0u32..1000, three()).prop_map(|(tick, rates)| {
+            Command::Inertial(Inertial { tick, attitude: [0.0, 0.6, 0.8, 0.0], rates })
+        }),
         3 => (0u32..1000, three(), three(), any_number()).prop_map(|(tick, position, velocity, vertical_acceleration)| {
             Command::Position(Position { tick, position, velocity, vertical_acceleration })
         }),
@@ -331,7 +334,9 @@ fn any_command() -> impl Strategy<Value = Command<'static>> {
             *numbers(&mut settings)[index] = number;
             Command::Settings(settings)
         }),
-        1 => prop::sample::select(vec![Command::Brake, Command::Arm, Command::Disarm, Command::Hello, Command::Lanes(Lanes::BOTH)]),
+        1 => prop::sample::select(vec![
+            Command::Brake, Command::Arm, Command::Disarm, Command::Hello, Command::Lanes(Lanes::BOTH)
+        ]),
     ]
 }
 

@@ -232,8 +232,9 @@ mod tests {
                     }
                 }
                 // As old as what was lost and delayed makes it, and no older.
-                let held = lost.iter().zip(&delays).enumerate().filter(|(sent, (lost, d))| !**lost && *sent as u32 + **d <= now);
-                if let Some((newest, _)) = held.last() {
+                let sent = lost.iter().zip(&delays).enumerate();
+                let mut held = sent.filter(|(sent, (lost, delay))| !**lost && *sent as u32 + **delay <= now);
+                if let Some((newest, _)) = held.next_back() {
                     prop_assert_eq!(source.stamp, Some(newest as u32));
                     worst = worst.max(source.age);
                 }

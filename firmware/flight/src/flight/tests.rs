@@ -1,7 +1,7 @@
 //! Every entry of the flight stack under any numbers.
 //!
-//! *in* states, setpoints and settings, most of which no vehicle has; *out* the same flight without them; *never* a number that is
-//! not finite; *source* proptest's draws.
+//! *in* states, setpoints and settings, some of which no vehicle has; *out* the same flight without them; *never* a number that
+//! is not finite; *source* proptest's draws.
 
 use nalgebra::{Quaternion, UnitQuaternion};
 use proptest::prelude::*;
