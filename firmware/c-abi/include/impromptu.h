@@ -101,11 +101,11 @@ enum impromptu_status
   IMPROMPTU_STATUS_NOT_CREATED = 4,
   // A count of channels differs from the signal table's, or exceeds IMPROMPTU_MAX_CHANNELS.
   IMPROMPTU_STATUS_COUNT = 5,
-  // A number is NaN or infinite.
+  // A number is NaN, infinite, or beyond what any vehicle has or does: 10 km, 400 m/s, 1000 m/s^2, 175 rad/s.
   IMPROMPTU_STATUS_NOT_FINITE = 6,
   // A name, unit or frame is not UTF-8.
   IMPROMPTU_STATUS_TEXT = 7,
-  // The settings are impossible: a rate that is not positive, or an airframe whose rotors cannot produce every moment.
+  // The settings are impossible: a number that no vehicle has, or an airframe whose rotors cannot produce every moment.
   IMPROMPTU_STATUS_SETTINGS = 8,
   // The model has no network, or the flight stack no model.
   IMPROMPTU_STATUS_NOTHING = 9,
@@ -446,14 +446,17 @@ impromptu_status impromptu_flight_attach(struct impromptu_flight *flight,
                                          int network,
                                          int feedback);
 
-// Appends the desired state of the next reference tick, as far ahead as impromptu_description.future says.
+// Appends the desired state of the next reference tick, as far ahead as impromptu_description.future says. One that is not
+// finite, or that no vehicle can be asked for, gives IMPROMPTU_STATUS_NOT_FINITE and is not stored: the next one is still that
+// of the same tick.
 impromptu_status impromptu_flight_push(struct impromptu_flight *flight, const struct impromptu_setpoint *setpoint);
 
 // Switches the network lane and the feedback lane on (not 0) or off.
 impromptu_status impromptu_flight_switch(struct impromptu_flight *flight, int network, int feedback);
 
-// One control tick, the network included. Ticks count from 0. A state that is not finite gives IMPROMPTU_STATUS_NOT_FINITE and
-// no command: what the motors then do is the caller's decision. Needs up to 4 KB of stack.
+// One control tick, the network included. Ticks count from 0. A state that is not finite, or that no vehicle can be in, gives
+// IMPROMPTU_STATUS_NOT_FINITE, no command, and changes nothing: a missed sample. What the motors then do is the caller's
+// decision. Needs up to 4 KB of stack.
 impromptu_status impromptu_flight_step(struct impromptu_flight *flight,
                                        struct impromptu_scratch *scratch,
                                        uint32_t tick,

@@ -24,11 +24,11 @@ pub enum Status {
     NotCreated = 4,
     /// A count of channels differs from the signal table's, or exceeds IMPROMPTU_MAX_CHANNELS.
     Count = 5,
-    /// A number is NaN or infinite.
+    /// A number is NaN, infinite, or beyond what any vehicle has or does: 10 km, 400 m/s, 1000 m/s^2, 175 rad/s.
     NotFinite = 6,
     /// A name, unit or frame is not UTF-8.
     Text = 7,
-    /// The settings are impossible: a rate that is not positive, or an airframe whose rotors cannot produce every moment.
+    /// The settings are impossible: a number that no vehicle has, or an airframe whose rotors cannot produce every moment.
     Settings = 8,
     /// The model has no network, or the flight stack no model.
     Nothing = 9,
@@ -109,9 +109,9 @@ impl Status {
             Self::Memory => c"the memory is too small: header and library are of different versions",
             Self::NotCreated => c"the object was not created, or is of another kind",
             Self::Count => c"a count of channels differs from the signal table's, or is too large",
-            Self::NotFinite => c"a number is NaN or infinite",
+            Self::NotFinite => c"a number is NaN, infinite, or beyond what any vehicle has or does",
             Self::Text => c"a name, unit or frame is not UTF-8",
-            Self::Settings => c"the settings are impossible: a rate, or an airframe that cannot be mixed",
+            Self::Settings => c"the settings are impossible: a number that no vehicle has, or an airframe that cannot be mixed",
             Self::Nothing => c"the model has no network, or the flight stack no model",
             Self::Damaged => c"the model file is damaged or incomplete: copy it again",
             Self::NotAModel => c"not a model file: give the file that model-export wrote",
