@@ -10,6 +10,7 @@ pub(crate) mod decode;
 mod feature;
 pub mod file;
 mod file_buffer;
+pub mod ranges;
 mod refusal;
 
 pub use blob::{Blob, Floats, Words};

@@ -103,6 +103,8 @@ pub enum Refusal {
         /// Index of the probe; `u8::MAX` for the feedback lane's.
         index: u8,
     },
+    /// A network without a single probe: nothing would show that this machine computes what was meant.
+    NoProbes,
     /// A probe inside of the envelope gives an output that the stored bounds exclude.
     Bounds {
         /// Index of the output.
@@ -171,8 +173,17 @@ impl fmt::Display for Refusal {
                 write!(f, "{what} holds a number that is not finite: the training diverged or the file was edited")
             }
             Self::Value { what } => {
-                write!(f, "{what} is out of its meaningful range: correct it in the description and export again")
+                write!(f, "{what} is out of its meaningful range")?;
+                if let Some(range) = super::ranges::named(what) {
+                    write!(f, ", {} to {}", range.least, range.most)?;
+                }
+                write!(f, ": correct it in the description and export again")
             }
+            Self::NoProbes => write!(
+                f,
+                "the network has no probes, by which a machine sees that it computes the same bits: export the model again, \
+                 model-export always writes them"
+            ),
             Self::Index { what, found } => write!(f, "{what} names index {found}, which the model does not have"),
             Self::Duplicate { what, found } => {
                 write!(f, "{what} names index {found} twice: correct it in the description and export again")
