@@ -12,6 +12,7 @@ pub mod file;
 mod file_buffer;
 pub mod ranges;
 mod refusal;
+pub mod trailer;
 
 pub use blob::{Blob, Floats, Words};
 pub use bounds::{Bounds, OutputBounds, Reach};

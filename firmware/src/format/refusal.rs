@@ -115,6 +115,17 @@ pub enum Refusal {
         /// Index of the output.
         output: u8,
     },
+    /// The application stores signed models only, and behind this one is no signature.
+    Unsigned,
+    /// None of the application's keys has signed this model with this version: another key, or a byte is not what was signed.
+    Signature,
+    /// A model is stored whose signed version is higher.
+    Downgrade {
+        /// Version of this model.
+        found: u32,
+        /// Lowest version that is stored.
+        floor: u32,
+    },
     /// The signal tables of the model and of the application differ.
     Signal {
         /// `desired`, `measured` or `reference`.
@@ -205,6 +216,19 @@ impl fmt::Display for Refusal {
                      raise the limit, or make it 0 to switch the output off"
                 )
             }
+            Self::Unsigned => {
+                write!(f, "the model is not signed, and only signed ones are stored here: sign it with model-export sign")
+            }
+            Self::Signature => write!(
+                f,
+                "none of the keys that are trusted here has signed the model as it arrived: \
+                 sign it with the right key, or copy it again"
+            ),
+            Self::Downgrade { found, floor } => write!(
+                f,
+                "the model's signed version is {found}, lower than {floor} is not stored here: \
+                 sign the model that shall fly with a higher --model-version"
+            ),
             Self::Signal { signal, channel } => {
                 write!(
                     f,
