@@ -10,6 +10,7 @@ pub(crate) mod decode;
 mod feature;
 pub mod file;
 mod file_buffer;
+mod range_check;
 pub mod ranges;
 mod refusal;
 pub mod trailer;

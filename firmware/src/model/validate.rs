@@ -18,7 +18,7 @@ const MAX_OFFSET_TICKS: i32 = 10_000;
 /// Indices, ranges and values of a card.
 #[inline(never)]
 pub(super) fn card(card: &Card<'_>) -> Result<(), Refusal> {
-    ranges::timing(card)?;
+    timing(card)?;
     signals(card)?;
     features(card)?;
     outputs(card)?;
@@ -36,6 +36,14 @@ pub(super) fn card(card: &Card<'_>) -> Result<(), Refusal> {
     }
     card.feedback.as_ref().map_or(Ok(()), |lane| self::lane(card, lane))?;
     card.monitor.as_ref().map_or(Ok(()), |monitor| self::monitor(card, monitor))
+}
+
+fn timing(card: &Card<'_>) -> Result<(), Refusal> {
+    let timing = &card.timing;
+    ranges::RATE.check(timing.reference_rate_hz)?;
+    ranges::DIVISOR.check(timing.divisor.into())?;
+    ranges::DELAY.check(timing.measurement_delay_ticks)?;
+    ranges::FADE.demand(ranges::fade(timing.fade_ticks, timing.reference_rate_hz))
 }
 
 fn signals(card: &Card<'_>) -> Result<(), Refusal> {
@@ -87,7 +95,9 @@ fn outputs(card: &Card<'_>) -> Result<(), Refusal> {
         if card.outputs.iter().take(index).any(|other| other.channel == found) {
             return Err(Refusal::Duplicate { what: "output channel", found });
         }
-        ranges::output(output.limit, output.slew)?;
+        if !ranges::output(output.limit, output.slew) {
+            return Err(Refusal::Value { what: "output limit or slew" });
+        }
     }
     Ok(())
 }
