@@ -151,11 +151,13 @@ fn load_rest<'a>(
     bounds: &mut Bounds<'a>,
 ) -> Result<(), Refusal> {
     *envelope = blob.floats(card.envelope, 2 * card.features.len(), "envelope")?.split_at(card.features.len());
+    [envelope.0, envelope.1].into_iter().try_for_each(|ends| ranges::ENVELOPE.all(ends))?;
     if envelope.0.iter().zip(envelope.1.iter()).any(|(low, high)| low > high) {
         return Err(Refusal::Value { what: "envelope" });
     }
     if let Some(layout) = &card.monitor {
-        *monitor = Some(Monitor::new(layout, blob)?);
+        let loaded = monitor.insert(Monitor::new(layout, blob)?);
+        loaded.axes().iter().try_for_each(|(_, taps)| ranges::TAPS.all(*taps))?;
     }
     *bounds = Bounds::new(card, blob)?;
     Ok(())

@@ -1,4 +1,4 @@
-//! The command line: `export`, `inspect`, `verify`.
+//! The command line: `export`, `inspect`, `verify`, `keygen`, `sign`.
 //!
 //! *in* arguments; *out* results on stdout, messages on stderr, an exit code; *never* a file that is half written, or a file
 //! replaced when something failed.
@@ -6,6 +6,7 @@
 mod export;
 mod files;
 mod format;
+mod sign;
 mod verify;
 
 use std::{
@@ -18,7 +19,13 @@ use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
 use impromptu_firmware::model::Model;
 
-use self::{export::Export, files::read, format::Format, verify::Verify};
+use self::{
+    export::Export,
+    files::{read, unsigned},
+    format::Format,
+    sign::{Keygen, Sign},
+    verify::Verify,
+};
 use crate::inspection::Inspection;
 
 /// Exit code: all is well.
@@ -38,7 +45,11 @@ Examples:
   model-export inspect net.model
   model-export inspect net.model --format json
   model-export verify net.model
-  model-export verify net.model --network net.safetensors --data flights.csv --max-rms-percent 1";
+  model-export verify net.model --network net.safetensors --data flights.csv --max-rms-percent 1
+  model-export keygen fleet.key
+      writes the private key, and fleet.key.pub for the vehicles
+  model-export sign net.model --key fleet.key --model-version 3 --output net.signed.model
+  model-export verify net.signed.model --key fleet.key.pub";
 
 #[derive(Debug, Parser)]
 #[command(
@@ -66,6 +77,10 @@ enum Command {
     },
     /// Re-runs a model file's probes, and compares it with the float network over rows of features.
     Verify(Verify),
+    /// Makes a key with which models are signed.
+    Keygen(Keygen),
+    /// Signs a model file for vehicles that store signed models only.
+    Sign(Sign),
 }
 
 /// Runs the program on `arguments` (the first of them is its name). Returns the exit code.
@@ -87,6 +102,8 @@ where
         Command::Export(export) => export.run(out).map(|()| true),
         Command::Inspect { file, format } => inspect(&file, format, out).map(|()| true),
         Command::Verify(verify) => verify.run(out, messages),
+        Command::Keygen(keygen) => keygen.run(out).map(|()| true),
+        Command::Sign(sign) => sign.run(out).map(|()| true),
     };
     match outcome {
         Ok(true) => FINE,
@@ -102,7 +119,8 @@ where
 
 fn inspect(file: &Path, format: Format, out: &mut dyn Write) -> Result<()> {
     let bytes = read(file)?;
-    let model = Model::from_bytes(&bytes).with_context(|| file.display().to_string())?;
-    let inspection = Inspection::new(&model, &bytes);
+    let bytes = unsigned(&bytes);
+    let model = Model::from_bytes(bytes).with_context(|| file.display().to_string())?;
+    let inspection = Inspection::new(&model, bytes);
     format.print(out, &inspection, || inspection.to_string())
 }

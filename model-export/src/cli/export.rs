@@ -1,16 +1,16 @@
 //! `model-export export`.
 
-use std::{
-    io::Write,
-    path::{Path, PathBuf},
-};
+use std::{io::Write, path::PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use impromptu_firmware::model::{Model, file};
+use impromptu_firmware::model::Model;
 use serde::Serialize;
 
-use super::{files::beside, format::Format};
+use super::{
+    files::{beside, refuse_foreign, same_file},
+    format::Format,
+};
 use crate::{
     Description, FloatNetwork, Precision, encode,
     replacement::replace,
@@ -92,7 +92,7 @@ impl Export {
                 bail!("{}: is an input, give another --output", self.output.display());
             }
         }
-        self.refuse_foreign()?;
+        refuse_foreign(&self.output, self.force)?;
         let precision = match self.precision {
             PrecisionName::Float => Precision::Float,
             PrecisionName::Int8 => Precision::Int8,
@@ -114,27 +114,6 @@ impl Export {
         };
         self.format.print(out, &written, || written.text())
     }
-
-    /// A slip such as `--output notes.txt` must not cost the notes.
-    fn refuse_foreign(&self) -> Result<()> {
-        let is_model = |path: &Path| -> std::io::Result<bool> {
-            let mut magic = Vec::new();
-            std::io::Read::read_to_end(&mut std::io::Read::take(std::fs::File::open(path)?, 8), &mut magic)?;
-            Ok(magic == file::MAGIC)
-        };
-        let path = &self.output;
-        if path.is_dir() {
-            bail!("{}: is a folder, give a file", path.display());
-        }
-        if !self.force && path.exists() && !is_model(path).with_context(|| path.display().to_string())? {
-            bail!("{}: exists and is not a model file; give another --output, or --force to replace it", path.display());
-        }
-        Ok(())
-    }
-}
-
-fn same_file(one: &Path, other: &Path) -> bool {
-    one == other || matches!((one.canonicalize(), other.canonicalize()), (Ok(one), Ok(other)) if one == other)
 }
 
 impl Written {

@@ -36,7 +36,9 @@ impl Folder {
 
     /// Runs a command whose words that end in a known extension are files of this folder.
     fn run(&self, command: &str) -> (u8, String, String) {
-        let file = |word: &str| [".safetensors", ".json", ".csv", ".model", ".txt"].iter().any(|end| word.ends_with(end));
+        let file = |word: &str| {
+            [".safetensors", ".json", ".csv", ".model", ".txt", ".key", ".pub"].iter().any(|end| word.ends_with(end))
+        };
         let words = command.split_whitespace().map(|word| if file(word) { self.path(word) } else { Path::new(word).to_owned() });
         let (mut out, mut messages) = (Vec::new(), Vec::new());
         let arguments: Vec<_> = [PathBuf::from("model-export")].into_iter().chain(words).collect();
@@ -193,4 +195,46 @@ fn usage_is_two_and_help_shows_examples() {
     let (code, _, messages) = folder.run("inspect absent.model");
     assert_eq!(code, FAILED);
     assert!(messages.contains("absent.model"));
+}
+
+#[test]
+fn a_signed_model_is_verified_with_the_signers_key_and_no_other() {
+    let folder = Folder::new();
+    assert_eq!(folder.run("export --network net.safetensors --output net.model").0, FINE);
+    let (code, out, messages) = folder.run("keygen fleet.key");
+    assert_eq!((code, messages.as_str()), (FINE, ""));
+    let public = std::fs::read_to_string(folder.path("fleet.key.pub")).unwrap();
+    assert!(public.trim().ends_with(out.split_whitespace().last().unwrap()), "{out}");
+    let private = std::fs::read(folder.path("fleet.key")).unwrap();
+    let (code, _, messages) = folder.run("keygen fleet.key");
+    assert!(code == FAILED && messages.contains("never replaced"), "{messages}");
+    assert_eq!(std::fs::read(folder.path("fleet.key")).unwrap(), private);
+    let (code, out, _) = folder.run("sign net.model --key fleet.key --model-version 3 --output signed.model");
+    assert!(code == FINE && out.contains("version 3"), "{out}");
+    let (file, signed) = ["net.model", "signed.model"].map(|name| std::fs::read(folder.path(name)).unwrap()).into();
+    assert!(signed.starts_with(&file) && signed.len() == file.len() + 96);
+    let (code, out, _) = folder.run("verify signed.model --key fleet.key.pub");
+    assert!(code == FINE && out.contains("signed by this key as version 3"), "{out}");
+    // Whoever does not ask reads the file as before.
+    assert_eq!(folder.run("verify signed.model").0, FINE);
+    let inspected = ["net.model", "signed.model"].map(|name| folder.run(&format!("inspect {name} --format json")).1);
+    assert_eq!(inspected[0], inspected[1]);
+    assert_eq!(folder.run("keygen other.key").0, FINE);
+    for (command, expected) in [
+        ("verify signed.model --key other.key.pub", "this key has not signed"),
+        ("verify net.model --key fleet.key.pub", "not signed"),
+        ("verify signed.model --key fleet.key", "public key"),
+        ("sign net.model --key fleet.key.pub --model-version 4 --output more.model", "private key"),
+        ("sign signed.model --key fleet.key --model-version 4 --output more.model", "signed already, as version 3"),
+        ("sign net.json --key fleet.key --model-version 4 --output more.model", "not a model file"),
+        ("sign net.model --key fleet.key --model-version 4 --output net.model", "is an input"),
+        ("sign net.model --key fleet.key --model-version 4 --output fleet.key", "is an input"),
+        ("sign net.model --key fleet.key --model-version 4 --output net.rows.csv", "not a model file"),
+    ] {
+        let (code, _, messages) = folder.run(command);
+        assert!(code == FAILED && messages.contains(expected), "{command}: {messages}");
+    }
+    assert_eq!(folder.run("sign net.model --key fleet.key --output more.model").0, USAGE);
+    assert!(!folder.path("more.model").exists());
+    assert_eq!(std::fs::read(folder.path("fleet.key")).unwrap(), private);
 }

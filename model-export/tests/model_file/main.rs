@@ -7,6 +7,7 @@ mod bounds;
 mod command_line;
 mod damage;
 mod description;
+mod edges;
 mod golden;
 mod guard;
 mod precision;
