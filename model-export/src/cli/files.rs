@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
+use impromptu_files::reading;
 
 /// A whole file; the error names it.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
-    std::fs::read(path).with_context(|| path.display().to_string())
+    reading::read(path, reading::DOCUMENT).with_context(|| path.display().to_string())
 }
 
 /// `NAME.safetensors` to `NAME.extension`.

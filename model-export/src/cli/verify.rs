@@ -4,6 +4,7 @@ use std::{io::Write, path::PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Args;
+use impromptu_files::text::line;
 use impromptu_firmware::model::Model;
 use serde::Serialize;
 
@@ -80,7 +81,7 @@ impl Verify {
             file: self.file,
         };
         for failure in &verified.failures {
-            writeln!(messages, "model-export: {failure}")?;
+            writeln!(messages, "model-export: {}", line(failure))?;
         }
         self.format.print(out, &verified, || verified.text())?;
         Ok(verified.failures.is_empty())
@@ -104,7 +105,7 @@ impl Verify {
 
 impl Verified {
     fn text(&self) -> String {
-        let mut text = format!("{}: loads, CRC {}\n", self.file.display(), self.crc);
+        let mut text = format!("{}: loads, CRC {}\n", line(&self.file.display().to_string()), self.crc);
         text += &format!(
             "same bits on this machine: {} network probes, {} feedback lane axes\n",
             self.network_probes, self.feedback_lane_probes
