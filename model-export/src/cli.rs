@@ -17,6 +17,7 @@ use std::{
 
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
+use impromptu_files::text::line;
 use impromptu_firmware::model::Model;
 
 use self::{
@@ -36,7 +37,7 @@ pub const FAILED: u8 = 1;
 pub const USAGE: u8 = 2;
 
 const EXAMPLES: &str = "\
-Exit codes: 0 fine, 1 a file was refused or a check failed, 2 wrong arguments.
+Exit codes: 0 fine, 1 a file was refused or a check failed, 2 wrong arguments, or an option is needed that settles something.
 
 Examples:
   model-export export --network out/net.safetensors --output out/net.model
@@ -83,6 +84,18 @@ enum Command {
     Sign(Sign),
 }
 
+/// What can be meant in two ways; names the option that settles it.
+#[derive(Debug)]
+struct Ambiguous(String);
+
+impl std::fmt::Display for Ambiguous {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Ambiguous {}
+
 /// Runs the program on `arguments` (the first of them is its name). Returns the exit code.
 pub fn run<I, T>(arguments: I, out: &mut dyn Write, messages: &mut dyn Write) -> u8
 where
@@ -99,7 +112,7 @@ where
         }
     };
     let outcome = match arguments.command {
-        Command::Export(export) => export.run(out).map(|()| true),
+        Command::Export(export) => export.run(out, messages).map(|()| true),
         Command::Inspect { file, format } => inspect(&file, format, out).map(|()| true),
         Command::Verify(verify) => verify.run(out, messages),
         Command::Keygen(keygen) => keygen.run(out).map(|()| true),
@@ -111,8 +124,8 @@ where
         // The reader has seen enough, `inspect … | head`.
         Err(error) if error.downcast_ref::<std::io::Error>().is_some_and(|error| error.kind() == ErrorKind::BrokenPipe) => FINE,
         Err(error) => {
-            let _ = writeln!(messages, "model-export: {error:#}");
-            FAILED
+            let _ = writeln!(messages, "model-export: {}", line(&format!("{error:#}")));
+            if error.is::<Ambiguous>() { USAGE } else { FAILED }
         }
     }
 }

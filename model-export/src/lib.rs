@@ -23,8 +23,8 @@
 //!
 //! | layer | modules | what they hold |
 //! |---|---|---|
-//! | 1 | `float_network`, `description`, `rows` | tensors, their meaning, rows |
-//! | 1 | `replacement`, `signing` | whole files; keys, signed models |
+//! | 1 | `float_network`, `rows`, `signing` | tensors, rows; keys, signed models |
+//! | 2 | `description` | their meaning, and which network and rows belong to it |
 //! | 2 | `export_error`, `integer_network`, `inspection` | failures; layers in integers; a file for people |
 //! | 3 | `packing` | layers in the order in which the kernels stream them |
 //! | 4 | `stored_network` | the network of a model file, unpacked |
@@ -44,7 +44,6 @@ pub mod inspection;
 pub mod integer_network;
 pub mod packing;
 pub mod quantise;
-pub mod replacement;
 pub mod rows;
 pub mod signing;
 pub mod stored_network;

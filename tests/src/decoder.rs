@@ -4,6 +4,7 @@
 //! whatever the bytes: that is what the fuzz target and the test on stable Rust look for.
 
 use impromptu_firmware::{
+    Cap, Caps,
     adapter::{Adapter, Lanes},
     feedback::{self, AxisState, Lane},
     model::{Blob, Card, MAX_FEATURES, MAX_OUTPUTS, Model, Probes, Section, file, ranges},
@@ -13,6 +14,8 @@ use impromptu_firmware::{
 
 /// Inputs that break arithmetic which trusts them.
 const EXTREMES: [f32; 8] = [0.0, 1.0, -3.4e38, 3.4e38, 1e-40, f32::INFINITY, f32::NEG_INFINITY, f32::NAN];
+/// Bounds of an application that are wider than any model's.
+const CAPS: Caps<'_> = Caps { channels: &[Cap { limit: 1e9, rate: 1e12 }; 2], sums: &[] };
 /// Samples that the adapter's preview holds here.
 const PREVIEW: usize = 256;
 
@@ -60,7 +63,9 @@ fn lean_on(lane: &Lane<'_>, dt: f32) {
 /// Steps an adapter of a loop with two channels each, if the model is for one.
 fn fly(model: &Model<'_>) {
     let card = model.card();
-    let Ok(mut adapter) = Adapter::<2, 2, 2>::new(model, &card.signals, card.timing.reference_rate_hz, PREVIEW) else { return };
+    let Ok(mut adapter) = Adapter::<2, 2, 2>::new(model, &card.signals, card.timing.reference_rate_hz, &CAPS, PREVIEW) else {
+        return;
+    };
     let mut scratch = Scratch::new();
     adapter.switch(Lanes::BOTH);
     let mut preview = Preview::<2, PREVIEW>::new([EndRule::Hold; 2], 0);

@@ -3,11 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use impromptu_files::reading;
 use impromptu_firmware::model::{file, trailer};
 
 /// A whole file; the error names it.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
-    std::fs::read(path).with_context(|| path.display().to_string())
+    reading::read(path, reading::DOCUMENT).with_context(|| path.display().to_string())
 }
 
 /// `NAME.safetensors` to `NAME.extension`.
@@ -22,18 +23,11 @@ pub(super) fn refuse_foreign(path: &Path, force: bool) -> Result<()> {
         std::io::Read::read_to_end(&mut std::io::Read::take(std::fs::File::open(path)?, 8), &mut magic)?;
         Ok(magic == file::MAGIC)
     };
-    if path.is_dir() {
-        bail!("{}: is a folder, give a file", path.display());
-    }
-    if !force && path.exists() && !is_model(path).with_context(|| path.display().to_string())? {
+    // A stream holds nothing that could be lost.
+    if !force && path.is_file() && !is_model(path).with_context(|| path.display().to_string())? {
         bail!("{}: exists and is not a model file; give another --output, or --force to replace it", path.display());
     }
     Ok(())
-}
-
-/// Whether two paths lead to one file.
-pub(super) fn same_file(one: &Path, other: &Path) -> bool {
-    one == other || matches!((one.canonicalize(), other.canonicalize()), (Ok(one), Ok(other)) if one == other)
 }
 
 /// The model file in bytes that may be signed.

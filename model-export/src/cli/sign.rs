@@ -2,19 +2,17 @@
 
 use std::{io::Write, path::PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use clap::Args;
+use impromptu_files::{place, replacement::replace, text::line};
 use impromptu_firmware::model::Model;
 use serde::Serialize;
 
 use super::{
-    files::{read, refuse_foreign, same_file},
+    files::{read, refuse_foreign},
     format::Format,
 };
-use crate::{
-    replacement::replace,
-    signing::{PrivateKey, hex, public_path},
-};
+use crate::signing::{PrivateKey, hex, public_path};
 
 /// Arguments of `keygen`.
 #[derive(Debug, Args)]
@@ -91,17 +89,15 @@ impl Sign {
         let signed = key.sign(&bytes, self.model_version).with_context(|| self.file.display().to_string())?;
         // Nobody shall vouch for a file that no machine flies.
         Model::from_bytes(&bytes).with_context(|| self.file.display().to_string())?;
-        for input in [&self.file, &self.key] {
-            if same_file(input, &self.output) {
-                bail!("{}: is an input, give another --output", self.output.display());
-            }
-        }
+        place::check(&self.output)
+            .and_then(|()| place::apart(&self.output, [&self.file, &self.key]))
+            .with_context(|| format!("--output {}", self.output.display()))?;
         refuse_foreign(&self.output, self.force)?;
         replace(&self.output, &signed).with_context(|| self.output.display().to_string())?;
         let signed = Signed { file: self.output, bytes: signed.len(), version: self.model_version, key: hex(&key.public()) };
         self.format.print(out, &signed, || {
             let Signed { file, bytes, version, key } = &signed;
-            format!("{}: {bytes} bytes, version {version}, signed by {key}\n", file.display())
+            format!("{}: {bytes} bytes, version {version}, signed by {key}\n", line(&file.display().to_string()))
         })
     }
 }

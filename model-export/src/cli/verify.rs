@@ -4,6 +4,7 @@ use std::{io::Write, path::PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Args;
+use impromptu_files::text::line;
 use impromptu_firmware::model::Model;
 use serde::Serialize;
 
@@ -94,7 +95,7 @@ impl Verify {
             file: self.file,
         };
         for failure in &verified.failures {
-            writeln!(messages, "model-export: {failure}")?;
+            writeln!(messages, "model-export: {}", line(failure))?;
         }
         self.format.print(out, &verified, || verified.text())?;
         Ok(verified.failures.is_empty())
@@ -118,7 +119,7 @@ impl Verify {
 
 impl Verified {
     fn text(&self) -> String {
-        let mut text = format!("{}: loads, CRC {}\n", self.file.display(), self.crc);
+        let mut text = format!("{}: loads, CRC {}\n", line(&self.file.display().to_string()), self.crc);
         if let Some(version) = self.signed_version {
             text += &format!("signed by this key as version {version}\n");
         }

@@ -64,6 +64,7 @@ pub(crate) fn description(window: usize) -> Description {
         envelope: vec![(-3.0, 3.0); window],
         feedback_lane: None,
         monitor: None,
+        tie: None,
     }
 }
 

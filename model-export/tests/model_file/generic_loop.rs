@@ -45,6 +45,7 @@ fn description() -> Description {
         envelope: vec![(-10.0, 10.0); 3],
         feedback_lane: None,
         monitor: None,
+        tie: None,
     }
 }
 

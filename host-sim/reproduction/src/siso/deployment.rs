@@ -79,6 +79,7 @@ pub fn model_file(
         envelope: rows.envelope().iter().map(|(low, high)| (*low as f32, *high as f32)).collect(),
         feedback_lane: None,
         monitor: None,
+        tie: None,
     };
     encode(&description, Some(&float_network(network)), precision, &rows.narrow())
 }
