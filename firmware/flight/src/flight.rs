@@ -3,6 +3,8 @@
 //! *in* the state at every control tick and the desired trajectory ahead of time; *out* a motor command; *never* an allocation, a
 //! panic, a global, or a clock of its own; *source* the loop of Zhou 2017, Fig. 1, with the rates of [`Rates`].
 
+mod clock;
+
 use core::num::NonZeroU32;
 
 use impromptu_firmware::{
@@ -21,6 +23,7 @@ use crate::{
 };
 
 pub use crate::settings::{Rates, Settings};
+use clock::Clock;
 
 /// Samples of the desired trajectory that the flight stack keeps: 1.92 s at 100 Hz.
 pub const PREVIEW: usize = 192;
@@ -96,39 +99,6 @@ pub struct Flight<'m> {
     state: Option<State>,
 }
 
-/// Reference ticks of control ticks, which wrap: after 99 days at 500 Hz the next reference tick is still the next one.
-#[derive(Clone, Copy, Debug)]
-struct Clock {
-    /// Control tick seen last,
-    control: u32,
-    /// control ticks since its reference tick,
-    phase: u32,
-    /// and the number of that one.
-    reference: i32,
-    running: bool,
-}
-
-impl Clock {
-    /// Nothing seen yet: all zeros.
-    const EMPTY: Self = Self { control: 0, phase: 0, reference: 0, running: false };
-
-    /// The clock at a control tick. The first one that is seen is as many ticks after reference tick 0 as its number says.
-    fn at(&self, tick: u32, divisor: NonZeroU32) -> Self {
-        if !self.running {
-            return Self { control: tick, phase: tick % divisor, reference: (tick / divisor) as i32, running: true };
-        }
-        let ahead = tick.wrapping_sub(self.control) as i32;
-        let divisor = i32::try_from(divisor.get()).unwrap_or(i32::MAX);
-        let since = (self.phase as i32).wrapping_add(ahead);
-        Self {
-            control: tick,
-            phase: since.rem_euclid(divisor) as u32,
-            reference: self.reference.wrapping_add(since.div_euclid(divisor)),
-            running: true,
-        }
-    }
-}
-
 impl<'m> Flight<'m> {
     /// A flight stack that knows no vehicle: its motors are off. It is 12 KB large and all zeros, so a microcontroller has it in
     /// a static and [configures](Flight::configure) it there.
@@ -152,11 +122,6 @@ impl<'m> Flight<'m> {
     pub fn new(settings: &Settings) -> Option<Self> {
         let mut flight = Self::empty();
         flight.configure(settings).then_some(flight)
-    }
-
-    /// Whether [`Flight::configure`] takes these settings.
-    pub fn is_flyable(settings: &Settings) -> bool {
-        Loops::new(settings).is_some()
     }
 
     /// Back on the ground with these settings; `false`, and nothing changes, if no vehicle has them ([`Settings::check`] says

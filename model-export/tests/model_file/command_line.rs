@@ -230,8 +230,8 @@ fn a_signed_model_is_verified_with_the_signers_key_and_no_other() {
         ("sign net.model --key fleet.key.pub --model-version 4 --output more.model", "private key"),
         ("sign signed.model --key fleet.key --model-version 4 --output more.model", "signed already, as version 3"),
         ("sign net.json --key fleet.key --model-version 4 --output more.model", "not a model file"),
-        ("sign net.model --key fleet.key --model-version 4 --output net.model", "is an input"),
-        ("sign net.model --key fleet.key --model-version 4 --output fleet.key", "is an input"),
+        ("sign net.model --key fleet.key --model-version 4 --output net.model", "same file as the input"),
+        ("sign net.model --key fleet.key --model-version 4 --output fleet.key", "same file as the input"),
         ("sign net.model --key fleet.key --model-version 4 --output net.rows.csv", "not a model file"),
     ] {
         let (code, _, messages) = folder.run(command);

@@ -4,6 +4,7 @@ mod fixture;
 
 mod batch;
 mod bounds;
+mod calls;
 mod command_line;
 mod damage;
 mod description;

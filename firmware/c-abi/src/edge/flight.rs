@@ -27,7 +27,7 @@ pub unsafe extern "C" fn impromptu_flight_create(
     unsafe {
         create::<Stack>(flight, size, |made| {
             let settings = input(settings)?.checked().ok_or(Status::Settings)?;
-            if !Flight::is_flyable(&settings) {
+            if settings.check().is_err() {
                 return Err(Status::Settings);
             }
             made.write(Stack { flight: EMPTY }).flight.configure(&settings);
