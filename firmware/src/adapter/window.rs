@@ -11,6 +11,8 @@ use crate::{
     math::{abs, clamp},
 };
 
+/// Sub-rate ticks over which a window may move by the guard's floor in addition.
+const CLOSE: f32 = 5.0;
 /// From this many times what is allowed on, nothing of the network's correction is left.
 const NOTHING_LEFT: f32 = 1.5;
 
@@ -32,40 +34,84 @@ pub(super) fn changes<const D: usize>(card: &Card<'_>, (low, high): &(Floats<'_>
     changes
 }
 
-/// Share of the network's correction that features leave it, 0..=1: all of it up to the guard's margin round what training saw,
-/// nothing from half as much again on.
+/// A window as it is read, offset by offset.
+#[derive(Clone, Copy)]
+struct Place<'f> {
+    feature: &'f Feature,
+    offset: i32,
+    value: f32,
+}
+
+/// Share of the network's correction that features leave it, 0..=1: all of it up to the guard's margin beyond what training saw,
+/// nothing from half as much again on. What counts is how far the window moves in a sub-rate tick.
 pub(super) fn share<const D: usize>(features: &[Feature], values: &[f32], changes: &[f32; D], settings: &GuardSettings) -> f32 {
     let mut excess = 0.0f32;
-    let mut last: Option<(&Feature, f32)> = None;
+    let mut last: Option<Place<'_>> = None;
     for (feature, value) in features.iter().zip(values) {
         if !along(feature) {
             last = None;
             continue;
         }
         let change = changes.get(usize::from(feature.channel)).copied().unwrap_or(0.0);
-        let within = |offsets: i32, moved: f32| {
-            let allowed = (1.0 + 2.0 * settings.envelope_margin) * change * offsets as f32 + settings.envelope_floor;
+        let allowed = (1.0 + settings.window_margin) * change + settings.envelope_floor / CLOSE;
+        let offset = i32::from(feature.offset);
+        let mut go = |before: Option<Place<'_>>, offset: i32, value: f32| {
+            let rate = before.map(|before| (value - before.value) / (offset - before.offset) as f32);
+            let moved = abs(rate.unwrap_or(0.0));
             // Written so that NaN is an excess.
-            if abs(moved) <= f32::MAX { abs(moved) / allowed } else { f32::MAX }
+            let found = if moved <= f32::MAX { moved / allowed } else { f32::MAX };
+            excess = if found > excess { found } else { excess };
+            Place { feature, offset, value }
         };
-        let same = last.filter(|(last, _)| {
-            last.channel == feature.channel && last.relative == feature.relative && last.offset < feature.offset
+        let mut before = last.filter(|last| {
+            last.feature.channel == feature.channel && last.feature.relative == feature.relative && last.offset < offset
         });
         // A window that is relative to its own channel leaves out the present, which is zero.
-        let present = feature.relative == Relative::Desired(feature.channel);
-        let offset = i32::from(feature.offset);
-        let found = match same {
-            Some((before, _)) if present && before.offset < 0 && offset > 0 => within(offset, *value),
-            Some((before, moved)) => within(offset - i32::from(before.offset), value - moved),
-            None if present && offset > 0 => within(offset, *value),
-            None => 0.0,
-        };
-        excess = if found > excess { found } else { excess };
-        if present && offset == -1 {
-            let found = within(1, *value);
-            excess = if found > excess { found } else { excess };
+        let present = feature.relative == Relative::Desired(feature.channel) && offset > 0;
+        if present && before.is_none_or(|before| before.offset < 0) {
+            before = Some(go(before, 0, 0.0));
         }
-        last = Some((feature, *value));
+        last = Some(go(before, offset, *value));
     }
     clamp((NOTHING_LEFT - excess) / (NOTHING_LEFT - 1.0), 0.0, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const CHANGES: [f32; 1] = [0.1];
+
+    fn found(value: impl Fn(f32) -> f32) -> f32 {
+        let features: heapless::Vec<Feature, 32> = crate::features::window(&[0], -4..=8).collect();
+        let values: heapless::Vec<f32, 32> =
+            features.iter().map(|feature| value(f32::from(feature.offset)) - value(0.0)).collect();
+        share(&features, &values, &CHANGES, &GuardSettings::default())
+    }
+
+    #[test]
+    fn a_step_leaves_nothing_of_the_network_before_it_comes() {
+        for at in [-4.0, -1.0, 0.0, 1.0, 3.0, 8.0] {
+            assert_eq!(found(|offset| if offset < at { 0.0 } else { 1.5 }), if at == -4.0 { 1.0 } else { 0.0 }, "{at}");
+        }
+        assert_eq!(found(|_| f32::NAN), 0.0);
+    }
+
+    #[test]
+    fn what_training_saw_leaves_all_and_half_as_much_again_nothing() {
+        // A tenth more, and the floor, are allowed: 0.114 in a sub-rate tick.
+        for (speed, expected) in [(0.1, 1.0), (0.113, 1.0), (0.1425, 0.5), (0.172, 0.0)] {
+            assert!((found(|offset| speed * offset) - expected).abs() < 1e-4, "{speed}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn it_is_a_share_whatever_comes_in(values in prop::collection::vec(any::<f32>(), 12), change in any::<f32>()) {
+            let features: heapless::Vec<Feature, 32> = crate::features::window(&[0], -4..=8).collect();
+            let share = share(&features, &values, &[change], &GuardSettings::default());
+            prop_assert!((0.0..=1.0).contains(&share), "{share}");
+        }
+    }
 }

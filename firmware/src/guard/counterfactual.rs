@@ -179,6 +179,10 @@ impl Counterfactual {
     pub(super) fn observe(&mut self, monitor: &Monitor<'_>, seen: &Outcome, settings: &GuardSettings, rate_hz: f32) {
         let shares = &seen.shares;
         self.reliance += (seen.network - self.reliance) * ewma_gain(1.0 / (settings.astray_s * rate_hz));
+        // Where less of it acts now, nothing is known of what it leaves.
+        if seen.network < self.reliance {
+            self.reliance = seen.network;
+        }
         let believed = |value: f32| clamp(finite_or_zero(value), -LARGEST, LARGEST);
         if !self.busy {
             // As if what is desired now had been desired for long.

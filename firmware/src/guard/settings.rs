@@ -23,6 +23,9 @@ pub struct GuardSettings {
     /// A feature may leave the training envelope by this much, in its unit, in addition to the margin: an envelope can have no
     /// width.
     pub envelope_floor: f32,
+    /// The network lane acts in full as long as the window of the desired trajectory moves by no more than this share beyond what
+    /// it moved by in training; from there on it acts less, before its features are outside.
+    pub window_margin: f32,
     /// The network lane trips after this many sub-rate ticks in a row with a feature outside; 0 counts as 1.
     pub envelope_ticks: u16,
     /// Both lanes trip when the newest measurement is older than the model's measurement delay by more than this time, s.
@@ -95,6 +98,7 @@ impl GuardSettings {
         handover_s: 0.0,
         envelope_margin: 0.0,
         envelope_floor: 0.0,
+        window_margin: 0.0,
         envelope_ticks: 0,
         stale_s: 0.0,
         saturated_share: 0.0,
@@ -126,6 +130,7 @@ impl GuardSettings {
         handover_s: 0.15,
         envelope_margin: 0.5,
         envelope_floor: 0.02,
+        window_margin: 0.1,
         envelope_ticks: 5,
         stale_s: 0.1,
         saturated_share: 0.5,
@@ -147,7 +152,7 @@ impl GuardSettings {
         astray_share: 0.3,
         astray_floor: 2.0,
         astray_s: 1.0,
-        astray_trips: 1,
+        astray_trips: 2,
         disturbance_s: 30.0,
     };
 }
