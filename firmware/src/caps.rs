@@ -1,8 +1,8 @@
 //! Bounds of the correction that the application sets, whatever a model says.
 //!
 //! *in* the largest correction of each reference channel and its largest rate of change, and of weighted sums of channels; *out*
-//! the correction within them; *never* a bound taken from data: a model's own limits only make it smaller; *source* the vehicle or
-//! machine before which the add-on stands.
+//! the correction within them; *never* a bound taken from data: a model's own limits only make it smaller; *source* the vehicle
+//! or machine before which the add-on stands.
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};

@@ -1,8 +1,8 @@
 //! What corrections of a quadrotor's references may be, whatever a model says.
 //!
-//! *in* the gains of the position loop; *out* bounds of each reference channel and of what the loop makes of them; *never* a bound
-//! from a model or its data; *source* thrust and tilt of a small quadrotor: an acceleration of 1.5 g across needs 1.8 times the
-//! hover thrust, as much as a Crazyflie has.
+//! *in* the gains of the position loop; *out* bounds of each reference channel and of what the loop makes of them; *never* a
+//! bound from a model or its data; *source* thrust and tilt of a small quadrotor: an acceleration of 1.5 g across needs 1.8
+//! times the hover thrust, as much as a Crazyflie has.
 
 use impromptu_firmware::caps::{Cap, SumCap};
 

@@ -16,10 +16,10 @@
 //! Messages and reasons may be added behind the last one; everything else makes another version.
 //!
 //! # Trust
-//! The check sum finds damage, not malice: whoever can write to the line flies the vehicle, and a recording that is said again to
-//! a disarmed vehicle is a host like any other. So the line is a wire, and what bridges it to a radio has to know who speaks.
-//! What holds for any speaker: no message turns a time-out off, changes the control rate, or makes a number of the loop one that no
-//! vehicle has; while armed no setting, no second arming and no setpoint of the past is taken.
+//! The check sum finds damage, not malice: whoever can write to the line flies the vehicle, and a recording that is said again
+//! to a disarmed vehicle is a host like any other. So the line is a wire, and what bridges it to a radio has to know who
+//! speaks. What holds for any speaker: no message turns a time-out off, changes the control rate, or makes a number of the loop
+//! one that no vehicle has; while armed no setting, no second arming and no setpoint of the past is taken.
 
 pub mod message;
 pub mod outcome;

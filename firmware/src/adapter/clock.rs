@@ -58,7 +58,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_first_tick_may_have_any_number(first in any::<i32>(), divisor in 1i32..20, steps in prop::collection::vec(-3i32..40, 0..50)) {
+        fn the_first_tick_may_have_any_number(
+            first in any::<i32>(), divisor in 1i32..20, steps in prop::collection::vec(-3i32..40, 0..50)
+        ) {
             let (mut here, mut there, mut at) = (Clock::EMPTY, Clock::EMPTY, 0i32);
             for step in steps {
                 prop_assert_eq!(here.advance(at, divisor), there.advance(first.wrapping_add(at), divisor));

@@ -87,9 +87,9 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
         self.good
     }
 
-    /// Brings the histories to the sub-rate tick that begins. Of a short gap they get what was newest; with the first tick that is
-    /// seen and after a long gap they start anew, and so do the lanes: the past reference is then the one that the loop would have
-    /// got without corrections.
+    /// Brings the histories to the sub-rate tick that begins. Of a short gap they get what was newest; with the first tick that
+    /// is seen and after a long gap they start anew, and so do the lanes: the past reference is then the one that the loop
+    /// would have got without corrections.
     fn catch_up<const N: usize>(&mut self, tick: i32, preview: &Preview<D, N>) {
         let sub_tick = self.clock.sub_tick();
         let missed = sub_tick.wrapping_sub(self.references.next_tick());

@@ -1,9 +1,9 @@
 //! What the window of the desired trajectory asks for, against what training saw.
 //!
-//! *in* the network lane's features, and the smallest and largest of each in training; *out* the share of the network's correction
-//! that may act, before it acts; *never* a look at a single value: a step is inside of every box of values long before it is
-//! reached; *source* the statistics of a trajectory are the same at every time, so what a window moved by from one offset to the
-//! next is bounded by what training moved by from the present to the next.
+//! *in* the network lane's features, and the smallest and largest of each in training; *out* the share of the network's
+//! correction that may act, before it acts; *never* a look at a single value: a step is inside of every box of values long
+//! before it is reached; *source* the statistics of a trajectory are the same at every time, so what a window moved by from one
+//! offset to the next is bounded by what training moved by from the present to the next.
 
 use crate::{
     format::{Card, Feature, Floats, Relative, Source},

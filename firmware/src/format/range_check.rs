@@ -1,7 +1,7 @@
 //! Numbers outside of their ranges are refused by name.
 //!
-//! *in* numbers of a model file and the [`Range`] that they must be in; *out* nothing, or the refusal; *never* NaN, which is in no
-//! range; *source* [`super::ranges`].
+//! *in* numbers of a model file and the [`Range`] that they must be in; *out* nothing, or the refusal; *never* NaN, which is in
+//! no range; *source* [`super::ranges`].
 
 use super::{Floats, Refusal, ranges::Range};
 

@@ -73,7 +73,8 @@ pub struct Energies {
     pub network_only: f32,
     /// Without any correction.
     pub baseline: f32,
-    /// That the loop's nominal response to the desired trajectory alone leads to: without disturbances, and whatever the loop does.
+    /// That the loop's nominal response to the desired trajectory alone leads to: without disturbances, and whatever the loop
+    /// does.
     pub nominal: f32,
     /// The same over a longer time: the long-term baseline.
     pub long_term_baseline: f32,
@@ -289,8 +290,8 @@ impl Counterfactual {
         self.harmful = [network, worse(past.with, past.without_feedback + share, settings.counterfactual_factor)];
     }
 
-    /// Compares the error with what the loop's nominal response to the desired trajectory alone leads to or, where the network has
-    /// long acted, with the share of it that such a lane leaves.
+    /// Compares the error with what the loop's nominal response to the desired trajectory alone leads to or, where the network
+    /// has long acted, with the share of it that such a lane leaves.
     ///
     /// Neither depends on how the loop responds now: a loop with more delay than the model knows, in which the feedback lane
     /// swings, cannot mislead this judge, as it does the counterfactual one. Disturbances can: so the error counts that there was

@@ -5,7 +5,8 @@ use anyhow::Context as _;
 use impromptu_files::text::cell;
 use std::io::Write;
 
-/// Writes the table's rows; a text that a spreadsheet would take for a formula begins with an apostrophe. Units: speed as a factor, `rms_cm_mean` in cm, reductions in %.
+/// Writes the table's rows; a text that a spreadsheet would take for a formula begins with an apostrophe. Units: speed as a
+/// factor, `rms_cm_mean` in cm, reductions in %.
 ///
 /// # Errors
 /// When `out` cannot be written.

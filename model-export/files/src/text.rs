@@ -113,7 +113,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn nothing_that_acts_is_left(text in any::<String>(), extra in "[\\x00-\\x1f\\x7f-\\x9f\\u{202a}-\\u{202e}\\u{2066}-\\u{2069}]{0,4}") {
+        fn nothing_that_acts_is_left(
+            text in any::<String>(),
+            extra in "[\\x00-\\x1f\\x7f-\\x9f\\u{202a}-\\u{202e}\\u{2066}-\\u{2069}]{0,4}"
+        ) {
             let text = format!("{text}{extra}{text}");
             prop_assert!(!line(&text).chars().any(acts));
             prop_assert!(!lines(&text).chars().any(|c| acts(c) && c != '\n'));

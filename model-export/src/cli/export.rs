@@ -143,7 +143,8 @@ impl Export {
             }
             Some(Some(what)) => bail!(
                 "{path}: belongs to another training than {name} (the {what} differ): give the files of one training; \
-                 `host-sim train` with the same logs, --name and --out writes all of them anew; --untied if they were changed by hand"
+                 `host-sim train` with the same logs, --name and --out writes all of them anew; \
+                 --untied if they were changed by hand"
             ),
             None if self.is_beside() => Ok(()),
             None => Err(Ambiguous(format!(

@@ -69,7 +69,9 @@ proptest! {
 
     /// A flight has the same bits from every tick on.
     #[test]
-    fn the_first_tick_may_have_any_number(seed in any::<u64>(), first in any::<i32>(), wrap in 0i32..150, linear in any::<bool>()) {
+    fn the_first_tick_may_have_any_number(
+        seed in any::<u64>(), first in any::<i32>(), wrap in 0i32..150, linear in any::<bool>()
+    ) {
         let interpolation = if linear { Interpolation::Linear } else { Interpolation::Hold };
         let (description, bytes) = violent(seed, interpolation);
         let model = Model::from_bytes(&bytes).unwrap();
@@ -92,20 +94,24 @@ proptest! {
             push(&mut add_ons);
             let measured = [measure.next(), measure.next()];
             let [here, there] = &mut add_ons;
-            let (here, there) = (here.step(tick, &measured, &mut scratch), there.step(first.wrapping_add(tick), &measured, &mut scratch));
+            let there = there.step(first.wrapping_add(tick), &measured, &mut scratch);
+            let here = here.step(tick, &measured, &mut scratch);
             prop_assert_eq!(here.map(f32::to_bits), there.map(f32::to_bits), "tick {}", tick);
         }
     }
 
     /// No call makes the correction larger than the application lets it be, or faster; the reference is always a number.
     #[test]
-    fn no_call_moves_the_correction_beyond_the_applications_bounds(seed in any::<u64>(), first in any::<i32>(), calls in prop::collection::vec(call(), 1..60)) {
+    fn no_call_moves_the_correction_beyond_the_applications_bounds(
+        seed in any::<u64>(), first in any::<i32>(), calls in prop::collection::vec(call(), 1..60)
+    ) {
         let files = [Interpolation::Linear, Interpolation::Hold].map(|interpolation| violent(seed, interpolation));
         let models = files.each_ref().map(|(_, bytes)| Model::from_bytes(bytes).unwrap());
         let signals = table(&files[0].0);
         let mut add_on = Cart::new(&models[0], &signals, 100.0, &CAPS).unwrap();
         add_on.clear(first);
-        let (mut numbers, mut scratch, mut tick, mut place, mut last) = (Numbers(seed), Scratch::new(), first, 0.0f32, [0.0f32; 2]);
+        let (mut numbers, mut scratch) = (Numbers(seed), Scratch::new());
+        let (mut tick, mut place, mut last) = (first, 0.0f32, [0.0f32; 2]);
         for call in calls {
             let (mut measured, mut ticks) = (None, 1);
             match call {
@@ -139,7 +145,8 @@ proptest! {
                     let correction = reference - desired;
                     let rounding = 1e-5;
                     prop_assert!(correction.abs() <= cap.limit + rounding, "{call:?} at {tick}: {correction}");
-                    prop_assert!((correction - *last).abs() <= cap.rate / 100.0 + rounding, "{call:?} at {tick}: {last} to {correction}");
+                    let change = (correction - *last).abs();
+                    prop_assert!(change <= cap.rate / 100.0 + rounding, "{call:?} at {tick}: {last} to {correction}");
                     *last = correction;
                 }
                 tick = tick.wrapping_add(1);

@@ -18,8 +18,8 @@ pub extern "C" fn impromptu_status_text(status: i32) -> *const c_char {
     known.map_or(c"no status of this library", Status::text).as_ptr()
 }
 
-/// Checks a model file of `length` bytes and creates the model in `model`, which has `size` bytes (sizeof *model). A model that was
-/// there before lives on if the file is refused; nothing that was created from it may be in use during the call.
+/// Checks a model file of `length` bytes and creates the model in `model`, which has `size` bytes (sizeof *model). A model that
+/// was there before lives on if the file is refused; nothing that was created from it may be in use during the call.
 ///
 /// The bytes stay where they are, in flash for instance: they must live and keep unchanged as long as the model. They should
 /// start at a multiple of 16 bytes; elsewhere they are read by slower kernels, with the same results. Needs up to 4 KB of stack

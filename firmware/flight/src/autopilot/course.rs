@@ -1,7 +1,8 @@
 //! The trajectory that the vehicle flies, made from what its link says of it.
 //!
 //! *in* setpoints with their ticks, re-plans and brakes; *out* setpoints of the flight stack, one for each reference tick;
-//! *never* a jump of the position from one tick to the next that the sender did not ask for with setpoints that came in time; *source* [`crate::motion`].
+//! *never* a jump of the position from one tick to the next that the sender did not ask for with setpoints that came in time;
+//! *source* [`crate::motion`].
 //!
 //! | what arrives | what is flown |
 //! |---|---|
