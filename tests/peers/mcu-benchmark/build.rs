@@ -25,9 +25,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         for entry in fs::read_dir(&folder).map_err(|error| format!("{IMAGES_VARIABLE}: {error}"))? {
             let entry = entry?;
             println!("cargo::rerun-if-changed={}", entry.path().display());
+            let image = fs::read(entry.path()).map_err(|error| format!("{}: {error}", entry.path().display()))?;
             // An engine of the registry takes its network apart while it is compiled.
-            fs::copy(entry.path(), Path::new(&out).join(entry.file_name()))?;
-            images.insert(entry.file_name(), fs::read(entry.path())?);
+            fs::write(Path::new(&out).join(entry.file_name()), &image)?;
+            images.insert(entry.file_name(), image);
         }
     }
     if images.keys().any(|name| name.as_encoded_bytes().starts_with(b"s8-")) {
