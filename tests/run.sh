@@ -180,6 +180,7 @@ bare_targets() {
     {
         cargo check $(packages $libraries) $(targets $(echo "$bare" | tr ' ' '\n' | grep -vx $target)) --locked
         (cross check $(packages $libraries) --target $target --locked)
+        (cross check --package impromptu-firmware --features defmt,serde --target $target --locked)
     }
 }
 
