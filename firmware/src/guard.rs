@@ -136,7 +136,9 @@ impl Guard {
             self.judge(seen);
         }
         let handover_step = ewma_gain(1.0 / (self.settings.handover_s * self.rate_hz));
-        Verdict { allowed: self.allowed(seen.wanted), handover_step }
+        // Without a trajectory there is nothing to correct.
+        let allowed = if seen.trajectory { self.allowed(seen.wanted) } else { Lanes::NONE };
+        Verdict { allowed, handover_step }
     }
 
     /// What the lanes did in the last reference tick. If none acted, or ticks are missing since, all that was learned is
@@ -156,34 +158,42 @@ impl Guard {
             None => self.oscillation = Oscillation::NONE,
         }
         if let Some(monitor) = seen.monitor {
-            self.counterfactual.observe(monitor, &last.errors, &last.shares, settings, self.rate_hz);
+            self.counterfactual.observe(monitor, last, settings, self.rate_hz);
         }
     }
 
     /// Trips lanes and lets them come back.
     fn judge(&mut self, seen: &Observation<'_>) {
         let settings = &self.settings;
-        let stale = f32::from(seen.age) > settings.stale_s * self.rate_hz;
+        let late_by = settings.stale_s * self.rate_hz;
+        let stale = f32::from(seen.age.saturating_add(seen.bad)) > late_by;
+        // One bad sample is one missed sample.
+        let not_finite = !seen.finite || f32::from(seen.bad) > late_by;
         let outside = self.outside >= settings.envelope_ticks.max(1);
         let late = seen.late >= settings.late_in_a_row.max(1);
         let [network_excess, feedback_excess] = self.excess.map(|share| share > settings.saturated_share);
         let [network_harms, feedback_harms] = self.counterfactual.harmful();
         let swings = self.oscillation.present(settings);
-        let first = |causes: [(bool, Trip); 7]| causes.into_iter().find(|(present, _)| *present).map(|(_, trip)| trip);
-        let cause = |own: [bool; 5]| {
-            let [outside, late, swings, excess, harms] = own;
+        let astray = self.counterfactual.astray();
+        if self.counterfactual.exonerated() {
+            self.feedback.exonerate(Trip::Astray);
+        }
+        let first = |causes: [(bool, Trip); 8]| causes.into_iter().find(|(present, _)| *present).map(|(_, trip)| trip);
+        let cause = |own: [bool; 6]| {
+            let [outside, late, swings, excess, harms, astray] = own;
             first([
-                (!seen.finite, Trip::NotFinite),
+                (not_finite, Trip::NotFinite),
                 (stale, Trip::Stale),
                 (outside, Trip::Envelope),
                 (late, Trip::Late),
                 (swings, Trip::Oscillation),
                 (excess, Trip::Saturated),
                 (harms, Trip::Counterfactual),
+                (astray, Trip::Astray),
             ])
         };
-        let network = cause([outside, late, false, network_excess, network_harms]).filter(|_| seen.wanted.network);
-        let feedback = cause([false, false, swings, feedback_excess, feedback_harms]).filter(|_| seen.wanted.feedback);
+        let network = cause([outside, late, false, network_excess, network_harms, false]).filter(|_| seen.wanted.network);
+        let feedback = cause([false, false, swings, feedback_excess, feedback_harms, astray]).filter(|_| seen.wanted.feedback);
         let hold = (settings.hold_s * self.rate_hz) as u32;
         let network = self.network.tick(network, hold, settings);
         let feedback = self.feedback.tick(feedback, hold, settings);

@@ -57,15 +57,22 @@ pub fn coarse_asin(x: f32) -> f32 {
     coarse_atan2(x, sqrt((1.0 - x) * (1.0 + x)))
 }
 
-/// `x` within `low..=high`; unlike `f32::clamp` without a panic for bounds in the wrong order. NaN stays NaN.
+/// `x` within `low..=high`; unlike `f32::clamp` without a panic for bounds in the wrong order. NaN does not pass: it becomes the
+/// number within the bounds that is nearest to 0, and 0 if they are no bounds either.
 #[inline(always)]
 pub fn clamp(x: f32, low: f32, high: f32) -> f32 {
     if x < low {
         low
+    } else if x <= high {
+        x
     } else if x > high {
         high
+    } else if low > 0.0 {
+        low
+    } else if high < 0.0 {
+        high
     } else {
-        x
+        0.0
     }
 }
 
@@ -78,6 +85,34 @@ pub fn finite_or_zero(x: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn nothing_but_a_number_within_the_bounds_passes_a_clamp(x: u32, low: u32, high: u32, like in 0..4) {
+            // Every bit pattern, and those of which at least one is no number or an end.
+            let [mut x, mut low, mut high] = [x, low, high].map(f32::from_bits);
+            match like {
+                0 => x = f32::NAN,
+                1 => low = f32::NAN,
+                2 => high = f32::NAN,
+                _ => {}
+            }
+            let found = clamp(x, low, high);
+            prop_assert!(!found.is_nan(), "{x} in {low}..={high}");
+            if low <= high {
+                prop_assert!(low <= found && found <= high, "{x} in {low}..={high}: {found}");
+                if low <= x && x <= high {
+                    prop_assert_eq!(found.to_bits(), x.to_bits());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_number_becomes_the_nearest_to_zero() {
+        assert_eq!([clamp(f32::NAN, -1.0, 1.0), clamp(f32::NAN, 2.0, 3.0), clamp(f32::NAN, -3.0, -2.0)], [0.0, 2.0, -2.0]);
+    }
 
     #[test]
     fn coarse_angles_stay_within_the_documented_error() {

@@ -25,6 +25,8 @@ pub struct Model<'a> {
     envelope: (Floats<'a>, Floats<'a>),
     bounds: Bounds<'a>,
     checksum: u32,
+    /// The whole file.
+    file: &'a [u8],
 }
 
 impl<'a> Model<'a> {
@@ -38,6 +40,7 @@ impl<'a> Model<'a> {
         envelope: (Floats::EMPTY, Floats::EMPTY),
         bounds: Bounds::EMPTY,
         checksum: 0,
+        file: &[],
     };
 
     /// Checks a model file and borrows its numbers.
@@ -66,7 +69,7 @@ impl<'a> Model<'a> {
     /// Stage by stage, none of which leaves anything on the stack for the next.
     #[inline(never)]
     fn load(&mut self, bytes: &'a [u8], scratch: &mut Scratch) -> Result<(), Refusal> {
-        let Self { card, blob, network, feedback, monitor, envelope, bounds, checksum } = self;
+        let Self { card, blob, network, feedback, monitor, envelope, bounds, checksum, file } = self;
         load_card(bytes, card, blob)?;
         validate::card(card)?;
         (*network, *feedback, *monitor) = (None, None, None);
@@ -82,7 +85,7 @@ impl<'a> Model<'a> {
         if let Some(lane) = feedback {
             validate::lane_probe(card, blob, lane)?;
         }
-        *checksum = file::checksum(bytes);
+        (*checksum, *file) = (self::file::checksum(bytes), bytes);
         Ok(())
     }
 
@@ -121,6 +124,11 @@ impl<'a> Model<'a> {
         &self.bounds
     }
 
+    /// The whole file, which has passed every check.
+    pub fn file(&self) -> &'a [u8] {
+        self.file
+    }
+
     /// CRC-32 that identifies the file.
     pub fn checksum(&self) -> u32 {
         self.checksum
@@ -143,11 +151,13 @@ fn load_rest<'a>(
     bounds: &mut Bounds<'a>,
 ) -> Result<(), Refusal> {
     *envelope = blob.floats(card.envelope, 2 * card.features.len(), "envelope")?.split_at(card.features.len());
+    [envelope.0, envelope.1].into_iter().try_for_each(|ends| ranges::ENVELOPE.all(ends))?;
     if envelope.0.iter().zip(envelope.1.iter()).any(|(low, high)| low > high) {
         return Err(Refusal::Value { what: "envelope" });
     }
     if let Some(layout) = &card.monitor {
-        *monitor = Some(Monitor::new(layout, blob)?);
+        let loaded = monitor.insert(Monitor::new(layout, blob)?);
+        loaded.axes().iter().try_for_each(|(_, taps)| ranges::TAPS.all(*taps))?;
     }
     *bounds = Bounds::new(card, blob)?;
     Ok(())

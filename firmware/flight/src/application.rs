@@ -118,7 +118,7 @@ impl<'m> Application<'m> {
                     // The core stands still while the flash is erased.
                     (sequence, Outcome::Refused(Reason::Busy))
                 } else {
-                    match autopilot.handle(&Received { sequence, order, message }) {
+                    match autopilot.carry_out(&Received { sequence, order, message }) {
                         Reaction::Silence => return None,
                         Reaction::Introduce => {
                             tx.send(&Report::Identity(autopilot.identity(SOFTWARE)));
@@ -176,6 +176,7 @@ impl<'m> Application<'m> {
             self.telemetry = 0;
             let frames = self.frames();
             self.tx.send(&Report::Telemetry(self.autopilot.telemetry(meters, frames)));
+            self.tx.send(&Report::Inputs(self.autopilot.inputs()));
         }
         (command, released)
     }
@@ -194,3 +195,6 @@ impl<'m> Application<'m> {
         self.receiver.counts().report()
     }
 }
+
+#[cfg(test)]
+mod tests;

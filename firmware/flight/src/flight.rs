@@ -3,10 +3,12 @@
 //! *in* the state at every control tick and the desired trajectory ahead of time; *out* a motor command; *never* an allocation, a
 //! panic, a global, or a clock of its own; *source* the loop of Zhou 2017, Fig. 1, with the rates of [`Rates`].
 
+mod clock;
+
 use core::num::NonZeroU32;
 
 use impromptu_firmware::{
-    AddOn,
+    AddOn, Caps,
     adapter::{Adapter, Inference, Job, Lanes},
     model::{MAX_AXES, Model, Refusal},
     network::Scratch,
@@ -14,12 +16,14 @@ use impromptu_firmware::{
 use nalgebra::{Matrix3, Vector3};
 
 use crate::{
+    caps,
     control::{AttitudeLoop, Mixer, PositionLoop, ThrustVector},
     quadrotor::{self, DESIRED, MEASURED, REFERENCE},
-    types::{MotorCommand, Reference, Setpoint, State, Tick},
+    types::{MotorCommand, POSITION_LIMIT, Reference, Setpoint, State, Tick, within},
 };
 
 pub use crate::settings::{Rates, Settings};
+use clock::Clock;
 
 /// Samples of the desired trajectory that the flight stack keeps: 1.92 s at 100 Hz.
 pub const PREVIEW: usize = 192;
@@ -41,8 +45,9 @@ struct Loops {
 }
 
 impl Loops {
-    /// `None` if the airframe cannot be mixed.
+    /// `None` if no vehicle has these settings.
     fn new(settings: &Settings) -> Option<Self> {
+        settings.check().ok()?;
         Some(Self {
             rates: settings.rates,
             position_divisor: NonZeroU32::new(settings.rates.position_divisor).unwrap_or(NonZeroU32::MIN),
@@ -89,6 +94,9 @@ pub struct Flight<'m> {
     wanted: ThrustVector,
     reference: Reference,
     dither: Vector3<f32>,
+    clock: Clock,
+    /// The newest state that a vehicle can be in.
+    state: Option<State>,
 }
 
 impl<'m> Flight<'m> {
@@ -104,17 +112,21 @@ impl<'m> Flight<'m> {
             },
             reference: Reference::ORIGIN,
             dither: Vector3::new(0.0, 0.0, 0.0),
+            clock: Clock::EMPTY,
+            state: None,
         }
     }
 
-    /// A flight stack on the ground; `None` if the airframe cannot be mixed. The first setpoint is that of reference tick 0.
+    /// A flight stack on the ground; `None` if no vehicle has these settings ([`Settings::check`] says why). The first setpoint
+    /// is that of reference tick 0.
     pub fn new(settings: &Settings) -> Option<Self> {
         let mut flight = Self::empty();
         flight.configure(settings).then_some(flight)
     }
 
-    /// Back on the ground with these settings; `false`, and nothing changes, if the airframe cannot be mixed. An add-on stays, as
-    /// it was when it was attached but with its lanes off, if its model is for these settings; else it is detached.
+    /// Back on the ground with these settings; `false`, and nothing changes, if no vehicle has them ([`Settings::check`] says
+    /// why). An add-on stays, as it was when it was attached but with its lanes off, if its model is for these settings; else it
+    /// is detached.
     pub fn configure(&mut self, settings: &Settings) -> bool {
         let Some(loops) = Loops::new(settings) else { return false };
         if self.add_on.model().is_some_and(|model| Self::accepts(model, &settings.rates).is_ok()) {
@@ -136,6 +148,8 @@ impl<'m> Flight<'m> {
         }
         self.add_on.reset(0);
         (self.wanted, self.reference, self.dither) = (ThrustVector::NONE, Reference::ORIGIN, Vector3::zeros());
+        self.clock = Clock::EMPTY;
+        self.state = None;
     }
 
     /// Puts an add-on before the configured loops, with the lanes given, in the place of the one that was there. The trajectory
@@ -146,8 +160,10 @@ impl<'m> Flight<'m> {
     /// settings has a rate of 0.
     pub fn attach(&mut self, model: &'m Model<'m>, lanes: Lanes) -> Result<(), Refusal> {
         Self::accepts(model, &self.stage.loops().map_or(Rates::NONE, |loops| loops.rates))?;
+        let sums = self.stage.loops().map(|loops| caps::sums(loops.position.gains()));
         let (adapter, _) = self.add_on.parts();
-        adapter.load(model, &quadrotor::signals());
+        let caps = Caps { channels: &caps::CHANNELS, sums: sums.as_ref().map_or(&[], |sums| sums) };
+        adapter.load(model, &quadrotor::signals(), &caps);
         adapter.defer();
         adapter.switch(lanes);
         self.stage = match core::mem::replace(&mut self.stage, Stage::Empty) {
@@ -174,7 +190,8 @@ impl<'m> Flight<'m> {
     /// As [`Flight::attach`].
     #[inline(never)]
     pub fn accepts(model: &Model<'_>, rates: &Rates) -> Result<(), Refusal> {
-        QuadrotorAddOn::check(model, quadrotor::signals(), rates.reference_hz())
+        let caps = Caps { channels: &caps::CHANNELS, sums: &[] };
+        QuadrotorAddOn::check(model, quadrotor::signals(), rates.reference_hz(), &caps)
     }
 
     /// The add-on, if there is one.
@@ -185,9 +202,14 @@ impl<'m> Flight<'m> {
         }
     }
 
-    /// Appends the desired state of the next reference tick.
-    pub fn push_setpoint(&mut self, setpoint: &Setpoint) {
-        self.add_on.parts().1.push(quadrotor::desired(setpoint));
+    /// Appends the desired state of the next reference tick; `false`, and nothing changes, if no vehicle can be asked for it
+    /// ([`Setpoint::is_physical`]): the next one is still that of the same tick.
+    pub fn push_setpoint(&mut self, setpoint: &Setpoint) -> bool {
+        let physical = setpoint.is_physical();
+        if physical {
+            self.add_on.parts().1.push(quadrotor::desired(setpoint));
+        }
+        physical
     }
 
     /// Reference tick of the next [`Flight::push_setpoint`].
@@ -205,10 +227,22 @@ impl<'m> Flight<'m> {
         self.add_on.clear(tick);
     }
 
+    /// The desired state at a reference tick; beyond the trajectory's ends at rest there.
+    pub fn setpoint(&self, tick: i32) -> Setpoint {
+        let [px, py, pz, vx, vy, vz, ax, ay, az, yaw] = self.add_on.desired(tick);
+        let vector = Vector3::new;
+        Setpoint { position: vector(px, py, pz), velocity: vector(vx, vy, vz), acceleration: vector(ax, ay, az), yaw }
+    }
+
+    /// Forgets the desired trajectory from a reference tick on, of which the next setpoint then is. What is before it stays.
+    pub fn replace_setpoints(&mut self, from: i32) {
+        self.add_on.truncate(from);
+    }
+
     /// Reference tick of a control tick.
     pub fn reference_tick(&self, tick: Tick) -> i32 {
         let divisor = self.stage.loops().map_or(NonZeroU32::MIN, |loops| loops.position_divisor);
-        (tick.0 / divisor) as i32
+        self.clock.at(tick.0, divisor).reference
     }
 
     /// Where the vehicle is desired to be at a control tick, m, world ENU; of the position loop's last tick.
@@ -218,12 +252,16 @@ impl<'m> Flight<'m> {
     }
 
     /// Adds an offset, m, world ENU, to the position reference from the next reference tick on: the independent dither without
-    /// which the closed loop cannot be identified. Zero leaves every bit as it is.
+    /// which the closed loop cannot be identified. Zero leaves every bit as it is. One that is further than any vehicle flies
+    /// changes nothing.
     pub fn set_dither(&mut self, offset: Vector3<f32>) {
-        self.dither = offset;
+        if within(offset.as_slice(), POSITION_LIMIT) {
+            self.dither = offset;
+        }
     }
 
-    /// One control tick, the network included.
+    /// One control tick, the network included. A state that no vehicle can be in ([`State::is_physical`]) is a missed sample: the
+    /// one before it stays, and until there has been one the motors are off.
     pub fn step<const S: usize>(&mut self, tick: Tick, state: &State, scratch: &mut Scratch<S>) -> MotorCommand {
         let (command, job) = self.control(tick, state);
         if let Some(job) = job
@@ -244,11 +282,27 @@ impl<'m> Flight<'m> {
 
     /// [`Flight::control`] that puts the job, if there is one, where the caller has room for it: `true`.
     pub fn control_into(&mut self, tick: Tick, state: &State, job: &mut Job) -> (MotorCommand, bool) {
-        let (wanted, released) = self.position_step(tick, state, job, |_| ());
+        match self.known(state) {
+            Some(state) => self.control_known(tick, &state, job),
+            None => (MotorCommand::OFF, false),
+        }
+    }
+
+    /// [`Flight::control_into`] for a state that was checked.
+    pub(crate) fn control_known(&mut self, tick: Tick, state: &State, job: &mut Job) -> (MotorCommand, bool) {
+        let (wanted, released) = self.position_part(tick, state, job, |_| ());
         if let Some(wanted) = wanted {
             self.wanted = wanted;
         }
-        (self.attitude_step(&self.wanted, state), released)
+        (self.attitude_part(&self.wanted, state), released)
+    }
+
+    /// The state, or, if no vehicle can be in it, the last one that a vehicle can be in.
+    fn known(&mut self, state: &State) -> Option<State> {
+        if state.is_physical() {
+            self.state = Some(*state);
+        }
+        self.state
     }
 
     /// The first half of a control tick: at a reference tick what the position loop wants of the attitude loop, and whether `job`
@@ -262,15 +316,29 @@ impl<'m> Flight<'m> {
         job: &mut Job,
         path: impl FnOnce(&mut [f32; MAX_AXES]),
     ) -> (Option<ThrustVector>, bool) {
+        match self.known(state) {
+            Some(state) => self.position_part(tick, &state, job, path),
+            None => (None, false),
+        }
+    }
+
+    fn position_part(
+        &mut self,
+        tick: Tick,
+        state: &State,
+        job: &mut Job,
+        path: impl FnOnce(&mut [f32; MAX_AXES]),
+    ) -> (Option<ThrustVector>, bool) {
         let (loops, corrected) = match &mut self.stage {
             Stage::Empty => return (None, false),
             Stage::Baseline(loops) => (loops, false),
             Stage::Adapted(loops) => (loops, true),
         };
-        if !tick.0.is_multiple_of(loops.position_divisor.get()) {
+        self.clock = self.clock.at(tick.0, loops.position_divisor);
+        if self.clock.phase != 0 {
             return (None, false);
         }
-        let reference_tick = (tick.0 / loops.position_divisor) as i32;
+        let reference_tick = self.clock.reference;
         let (reference, released) = if corrected {
             adapted(&mut self.add_on, reference_tick, state, job, path)
         } else {
@@ -285,6 +353,13 @@ impl<'m> Flight<'m> {
 
     /// The second half of a control tick: what the motors get for what the position loop wants.
     pub fn attitude_step(&self, wanted: &ThrustVector, state: &State) -> MotorCommand {
+        match if state.is_physical() { Some(state) } else { self.state.as_ref() } {
+            Some(state) => self.attitude_part(wanted, state),
+            None => MotorCommand::OFF,
+        }
+    }
+
+    fn attitude_part(&self, wanted: &ThrustVector, state: &State) -> MotorCommand {
         let Some(loops) = self.stage.loops() else { return MotorCommand::OFF };
         let (thrust, moment) = loops.attitude.step(wanted, state);
         loops.mixer.mix(thrust, &moment)
@@ -317,3 +392,6 @@ fn desired(add_on: &QuadrotorAddOn<'_>, tick: i32) -> Reference {
     let [px, py, pz, vx, vy, vz, .., yaw] = add_on.desired(tick);
     quadrotor::reference(&[px, py, pz, vx, vy, vz], yaw)
 }
+
+#[cfg(test)]
+mod tests;

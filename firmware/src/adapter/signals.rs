@@ -5,7 +5,7 @@
 
 use crate::{
     features::Signals,
-    format::{Card, Channels, HISTORY, Refusal},
+    format::{Card, Channels, EndRule, HISTORY, Refusal},
     preview::Preview,
 };
 
@@ -18,6 +18,17 @@ pub(super) struct View<'a, const D: usize, const M: usize, const R: usize, const
     pub(super) measured: &'a History<M>,
     pub(super) references: &'a History<R>,
     pub(super) divisor: i32,
+    /// Reference tick of the newest sub-rate tick, and its number, by which the histories are addressed.
+    pub(super) now: i32,
+    pub(super) sub_tick: i32,
+}
+
+impl<const D: usize, const M: usize, const R: usize, const N: usize> View<'_, D, M, R, N> {
+    /// Number of the newest sub-rate tick at or before a reference tick.
+    #[inline]
+    fn sub_tick(&self, tick: i32) -> i32 {
+        self.sub_tick.wrapping_add(tick.wrapping_sub(self.now).div_euclid(self.divisor.max(1)))
+    }
 }
 
 impl<const D: usize, const M: usize, const R: usize, const N: usize> Signals for View<'_, D, M, R, N> {
@@ -27,11 +38,11 @@ impl<const D: usize, const M: usize, const R: usize, const N: usize> Signals for
     }
     #[inline]
     fn measured(&self, tick: i32, channel: usize) -> f32 {
-        self.measured.channel(tick.div_euclid(self.divisor.max(1)), channel)
+        self.measured.channel(self.sub_tick(tick), channel)
     }
     #[inline]
     fn reference(&self, tick: i32, channel: usize) -> f32 {
-        self.references.channel(tick.div_euclid(self.divisor.max(1)), channel)
+        self.references.channel(self.sub_tick(tick), channel)
     }
 }
 
@@ -44,12 +55,23 @@ pub(super) fn matched_error<const D: usize, const N: usize>(
     measured: &[f32],
     (measured_channel, desired_channel): (u8, u8),
 ) -> f32 {
+    let then = matched_desired(tick, delay, preview, desired_channel);
+    measured.get(usize::from(measured_channel)).copied().unwrap_or(then) - then
+}
+
+/// A desired channel at the time of a measurement that is `delay` reference ticks old.
+#[inline]
+pub(super) fn matched_desired<const D: usize, const N: usize>(
+    tick: i32,
+    delay: f32,
+    preview: &Preview<D, N>,
+    desired_channel: u8,
+) -> f32 {
     let whole = delay as i32;
     let channel = usize::from(desired_channel);
     let newer = preview.channel(tick.wrapping_sub(whole), channel);
     let older = preview.channel(tick.wrapping_sub(whole.saturating_add(1)), channel);
-    let then = newer + (older - newer) * (delay - whole as f32);
-    measured.get(usize::from(measured_channel)).copied().unwrap_or(then) - then
+    newer + (older - newer) * (delay - whole as f32)
 }
 
 /// Desired channel of the same name for each reference channel.
@@ -57,6 +79,15 @@ pub(super) fn base_channels<const R: usize>(table: &Channels<'_>) -> [usize; R] 
     core::array::from_fn(|r| {
         let name = table.reference.get(r).map(|channel| channel.name);
         table.desired.iter().position(|desired| Some(desired.name) == name).unwrap_or(0)
+    })
+}
+
+/// Measured channel of the same name for each reference channel; none for one that is zero at rest.
+pub(super) fn measured_channels<const R: usize>(table: &Channels<'_>) -> [Option<u8>; R] {
+    core::array::from_fn(|r| {
+        let reference = table.reference.get(r).filter(|channel| channel.end == EndRule::Hold)?;
+        let found = table.measured.iter().position(|measured| measured.name == reference.name)?;
+        u8::try_from(found).ok()
     })
 }
 

@@ -23,6 +23,9 @@ pub struct GuardSettings {
     /// A feature may leave the training envelope by this much, in its unit, in addition to the margin: an envelope can have no
     /// width.
     pub envelope_floor: f32,
+    /// The network lane acts in full as long as the window of the desired trajectory moves by no more than this share beyond what
+    /// it moved by in training; from there on it acts less, before its features are outside.
+    pub window_margin: f32,
     /// The network lane trips after this many sub-rate ticks in a row with a feature outside; 0 counts as 1.
     pub envelope_ticks: u16,
     /// Both lanes trip when the newest measurement is older than the model's measurement delay by more than this time, s.
@@ -68,6 +71,20 @@ pub struct GuardSettings {
     pub oscillation_s: f32,
     /// The feedback lane stays off after this many trips by oscillation, until it is armed again: each return would swing again.
     pub oscillation_trips: u16,
+    /// The feedback lane trips when the RMS of the error is more than this factor of what the loop's nominal response to the
+    /// desired trajectory leads to, beyond the floor.
+    pub astray_factor: f32,
+    /// The same factor where the network lane has acted in full for long: it leaves but a share of that error.
+    pub astray_share: f32,
+    /// An error below this many times the model's validated RMS is not astray.
+    pub astray_floor: f32,
+    /// What the nominal response leads to is forgotten with this time constant, s: the loop may be later than nominal.
+    pub astray_s: f32,
+    /// The feedback lane stays off after this many trips astray, until it is armed again, or until the error turns out as bad
+    /// without it.
+    pub astray_trips: u16,
+    /// What the error was without the feedback lane is forgotten with this time constant, s.
+    pub disturbance_s: f32,
 }
 
 impl GuardSettings {
@@ -81,6 +98,7 @@ impl GuardSettings {
         handover_s: 0.0,
         envelope_margin: 0.0,
         envelope_floor: 0.0,
+        window_margin: 0.0,
         envelope_ticks: 0,
         stale_s: 0.0,
         saturated_share: 0.0,
@@ -98,6 +116,12 @@ impl GuardSettings {
         oscillation_power: 0.0,
         oscillation_s: 0.0,
         oscillation_trips: 0,
+        astray_factor: 0.0,
+        astray_share: 0.0,
+        astray_floor: 0.0,
+        astray_s: 0.0,
+        astray_trips: 0,
+        disturbance_s: 0.0,
     };
 
     const DEFAULT: Self = Self {
@@ -106,6 +130,7 @@ impl GuardSettings {
         handover_s: 0.15,
         envelope_margin: 0.5,
         envelope_floor: 0.02,
+        window_margin: 0.1,
         envelope_ticks: 5,
         stale_s: 0.1,
         saturated_share: 0.5,
@@ -123,6 +148,12 @@ impl GuardSettings {
         oscillation_power: 0.8,
         oscillation_s: 0.5,
         oscillation_trips: 1,
+        astray_factor: 1.5,
+        astray_share: 0.3,
+        astray_floor: 2.0,
+        astray_s: 1.0,
+        astray_trips: 2,
+        disturbance_s: 30.0,
     };
 }
 

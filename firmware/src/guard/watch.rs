@@ -14,12 +14,13 @@ pub(super) struct Watch {
     remaining: u32,
     /// Trips since it was armed that the lane itself is to blame for.
     strikes: u16,
-    locked: bool,
+    /// Why it stays off until it is armed again.
+    locked: Option<Trip>,
 }
 
 impl Watch {
     /// Free to act.
-    pub(super) const ARMED: Self = Self { tripped: false, remaining: 0, strikes: 0, locked: false };
+    pub(super) const ARMED: Self = Self { tripped: false, remaining: 0, strikes: 0, locked: None };
 
     pub(super) fn tripped(&self) -> bool {
         self.tripped
@@ -27,14 +28,21 @@ impl Watch {
 
     /// Clears what the lane itself was to blame for; a running hold time goes on.
     pub(super) fn unlock(&mut self) {
-        (self.strikes, self.locked) = (0, false);
+        (self.strikes, self.locked) = (0, None);
+    }
+
+    /// The lane was not to blame for what locked it out, if it was this.
+    pub(super) fn exonerate(&mut self, trip: Trip) {
+        if self.locked == Some(trip) {
+            self.unlock();
+        }
     }
 
     /// One reference tick with the cause that is present, if any; returns it if it trips the lane now.
     pub(super) fn tick(&mut self, cause: Option<Trip>, hold: u32, settings: &GuardSettings) -> Option<Trip> {
         let Some(trip) = cause else {
             self.remaining = self.remaining.saturating_sub(1);
-            self.tripped &= self.remaining > 0 || self.locked;
+            self.tripped &= self.remaining > 0 || self.locked.is_some();
             return None;
         };
         self.remaining = hold.max(1);
@@ -45,10 +53,11 @@ impl Watch {
         let most = match trip {
             Trip::Counterfactual => settings.counterfactual_trips,
             Trip::Oscillation => settings.oscillation_trips,
+            Trip::Astray => settings.astray_trips,
             _ => return Some(trip),
         };
         self.strikes = self.strikes.saturating_add(1);
-        self.locked = self.strikes >= most;
+        self.locked = (self.strikes >= most).then_some(trip);
         Some(trip)
     }
 }

@@ -9,7 +9,7 @@ use super::{
     kernel::{self, Finish, Width, portable},
     shape::{INPUT_PADDING, ROWS, padded},
 };
-use crate::format::{Activation, Blob, Floats, LayerLayout, Refusal};
+use crate::format::{Activation, Blob, Floats, LayerLayout, Refusal, ranges::ROW_SCALES};
 
 /// One checked layer.
 #[derive(Debug)]
@@ -51,10 +51,13 @@ impl<'a> Layer<'a> {
         let kernel = kernel::Integer::new(width, stream, inputs, finish);
         let layer = Self { kernel, width, inputs: inputs as u16, limit };
         layer.refuse_overflow(index, before)?;
-        if next.is_none()
-            && !layer.blocks().all(|(_, _, scales)| scales.iter().all(|scale| f32::from_le_bytes(*scale).is_finite()))
-        {
-            return Err(Refusal::NotFinite { what: "layer row scales" });
+        if next.is_none() {
+            for scale in layer.blocks().flat_map(|(_, _, scales)| scales.map(f32::from_le_bytes)) {
+                if !scale.is_finite() {
+                    return Err(Refusal::NotFinite { what: ROW_SCALES.what });
+                }
+                ROW_SCALES.check(scale)?;
+            }
         }
         Ok(layer)
     }

@@ -23,7 +23,10 @@ mod scratch;
 mod shape;
 mod tanh;
 
-use crate::format::{Arithmetic, Blob, Floats, MAX_FEATURES, MAX_LAYERS, MAX_OUTPUTS, NetworkLayout, Refusal};
+use crate::{
+    format::{Arithmetic, Blob, Floats, MAX_FEATURES, MAX_LAYERS, MAX_OUTPUTS, NetworkLayout, Refusal, ranges},
+    math::abs,
+};
 
 pub use crate::format::Activation;
 pub use requantisation::requantise;
@@ -54,6 +57,17 @@ pub struct Network<'a> {
 }
 
 impl<'a> Network<'a> {
+    /// Checks shapes, sections and ranges of a layout against the blob, for `inputs` features and `outputs` corrections. Probes
+    /// are [`Model::from_bytes`](crate::model::Model::from_bytes)' affair.
+    ///
+    /// # Errors
+    /// With the section or value that is wrong.
+    pub fn new(layout: &NetworkLayout, blob: &Blob<'a>, inputs: usize, outputs: usize) -> Result<Self, Refusal> {
+        let mut place = None;
+        Self::load(&mut place, layout, blob, inputs, outputs)?;
+        place.ok_or(Refusal::Card)
+    }
+
     /// Checks shapes and sections against `inputs` features and `outputs` corrections, and makes the network in `place`. After an
     /// error there may be a part of one.
     #[inline(never)]
@@ -92,6 +106,10 @@ impl<'a> Network<'a> {
             blob.floats(layout.input_normalisation, 2 * inputs, "input normalisation")?.split_at(inputs);
         let (output_scale, output_mean) =
             blob.floats(layout.output_normalisation, 2 * outputs, "output normalisation")?.split_at(outputs);
+        ranges::INPUT_MEAN.all(mean)?;
+        ranges::INPUT_SCALE.all(reciprocal_scale)?;
+        ranges::OUTPUT_SCALE.all(output_scale)?;
+        ranges::OUTPUT_MEAN.all(output_mean)?;
         let mut multiply_adds = chained(layout, inputs, outputs)?;
         let skip = if layout.skip.length > 0 {
             multiply_adds += (inputs * outputs) as u32;
@@ -108,9 +126,7 @@ impl<'a> Network<'a> {
                 if !layout.input_code.is_finite() {
                     return Err(Refusal::NotFinite { what: "input code" });
                 }
-                if layout.input_code <= 0.0 {
-                    return Err(Refusal::Value { what: "input code" });
-                }
+                ranges::INPUT_CODE.check(layout.input_code)?;
                 Layers::Integer { code: layout.input_code, layers: heapless::Vec::new() }
             }
         };
@@ -129,6 +145,7 @@ impl<'a> Network<'a> {
     }
 
     /// Evaluates the network: `inputs` in physical units, one for each feature; `outputs` in the units of the corrected channels.
+    /// Whatever comes in, an output is finite: one that would be beyond [`ranges::MAGNITUDE`] or no number is 0.
     /// A scratch of fewer words than [`Network::scratch_words`], or fewer inputs than features, leave `outputs` as they are.
     #[inline]
     pub fn evaluate<const WORDS: usize>(&self, inputs: &[f32], outputs: &mut [f32], scratch: &mut Scratch<WORDS>) {
@@ -174,7 +191,9 @@ impl<'a> Network<'a> {
     /// Writes the skip's outputs, if there is one.
     #[inline(always)]
     fn skip(&self, normalised: &[u32], outputs: &mut [f32]) {
-        if let Some(skip) = &self.skip {
+        // The rows behind the last output are padding.
+        let count = self.output_scale.len().min(outputs.len());
+        if let (Some(skip), Some(outputs)) = (&self.skip, outputs.get_mut(..count)) {
             skip.outputs(normalised, outputs);
         }
     }
@@ -185,7 +204,9 @@ impl<'a> Network<'a> {
         let denormalisation = self.output_scale.iter().zip(self.output_mean.iter());
         for ((output, value), (scale, mean)) in outputs.iter_mut().zip(values).zip(denormalisation) {
             let skip = if self.skip.is_some() { *output } else { 0.0 };
-            *output = (skip + value) * scale + mean;
+            let value = (skip + value) * scale + mean;
+            // Neither NaN nor an infinity, nor a number that would make one of the next: none of it was meant, so no correction.
+            *output = if abs(value) <= ranges::MAGNITUDE { value } else { 0.0 };
         }
     }
 }

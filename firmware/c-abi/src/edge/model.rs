@@ -4,7 +4,7 @@ use core::ffi::c_char;
 
 use impromptu_firmware::{model::Model, network::Scratch};
 
-use super::{Place, checked, create, input, object, report, view};
+use super::{Made, Place, checked, create, input, object, report, view};
 use crate::{
     memory::{ModelMemory, Object, ScratchMemory},
     status::Status,
@@ -18,7 +18,8 @@ pub extern "C" fn impromptu_status_text(status: i32) -> *const c_char {
     known.map_or(c"no status of this library", Status::text).as_ptr()
 }
 
-/// Checks a model file of `length` bytes and creates the model in `model`, which has `size` bytes (sizeof *model).
+/// Checks a model file of `length` bytes and creates the model in `model`, which has `size` bytes (sizeof *model). A model that
+/// was there before lives on if the file is refused; nothing that was created from it may be in use during the call.
 ///
 /// The bytes stay where they are, in flash for instance: they must live and keep unchanged as long as the model. They should
 /// start at a multiple of 16 bytes; elsewhere they are read by slower kernels, with the same results. Needs up to 4 KB of stack
@@ -32,12 +33,29 @@ pub unsafe extern "C" fn impromptu_model_create(model: *mut ModelMemory, size: u
     };
     // SAFETY: the module's rules.
     unsafe {
-        create::<Model<'static>>(model, size, |place| {
-            place.write(Model::EMPTY);
-            Model::load_into(&mut *place, bytes, &mut Scratch::new())?;
-            Ok(())
+        create::<Model<'static>>(model, size, |made| {
+            let before = view::<Model<'static>>(model).ok().map(Model::file);
+            load(made, bytes, before)
         })
     }
+}
+
+/// Loads a model where it will live, or, if it is refused, the one again that was there before.
+#[inline(never)]
+unsafe fn load(made: Made<'_, Model<'static>>, bytes: &'static [u8], before: Option<&'static [u8]>) -> Result<(), Status> {
+    // SAFETY: the module's rules.
+    let mut place = unsafe { made.begin(Model::EMPTY) };
+    let mut scratch = Scratch::new();
+    let refusal = match Model::load_into(place.value(), bytes, &mut scratch) {
+        Ok(_) => None,
+        Err(refusal) => match before {
+            // It passed every check before.
+            Some(file) if Model::load_into(place.value(), file, &mut scratch).is_ok() => Some(refusal),
+            _ => return Err(refusal.into()),
+        },
+    };
+    place.finish();
+    refusal.map_or(Ok(()), |refusal| Err(refusal.into()))
 }
 
 /// What a model says of itself.
@@ -60,8 +78,8 @@ pub unsafe extern "C" fn impromptu_model_describe(model: *const ModelMemory, des
 pub unsafe extern "C" fn impromptu_scratch_create(scratch: *mut ScratchMemory, size: usize) -> Status {
     // SAFETY: the module's rules.
     unsafe {
-        create::<Scratch>(scratch, size, |place| {
-            place.write(Scratch::new());
+        create::<Scratch>(scratch, size, |made| {
+            made.write(Scratch::new());
             Ok(())
         })
     }
