@@ -12,6 +12,7 @@ mod monitor;
 mod observation;
 mod oscillation;
 mod settings;
+mod swing;
 mod trip;
 mod watch;
 
@@ -138,7 +139,10 @@ impl Guard {
         let handover_step = ewma_gain(1.0 / (self.settings.handover_s * self.rate_hz));
         // Without a trajectory there is nothing to correct.
         let allowed = if seen.trajectory { self.allowed(seen.wanted) } else { Lanes::NONE };
-        Verdict { allowed, handover_step }
+        // Without a monitor nobody knows what swings.
+        let judged = self.settings.enabled && seen.monitor.is_some();
+        let share = if judged { self.counterfactual.swing().share() } else { 1.0 };
+        Verdict { allowed, handover_step, share }
     }
 
     /// What the lanes did in the last reference tick. If none acted, or ticks are missing since, all that was learned is
@@ -174,10 +178,11 @@ impl Guard {
         let [network_excess, feedback_excess] = self.excess.map(|share| share > settings.saturated_share);
         let [network_harms, feedback_harms] = self.counterfactual.harmful();
         let swings = self.oscillation.present(settings);
-        let astray = self.counterfactual.astray();
-        if self.counterfactual.exonerated() {
-            self.feedback.exonerate(Trip::Astray);
-        }
+        // A lane that shook the loop comes back when the loop is calm. Until then what swings says nothing about the network.
+        let swing = self.counterfactual.swing();
+        let shaken = swing.swinging() && self.feedback.tripped_by(Trip::Astray);
+        let astray = swing.astray() || shaken;
+        let network_harms = network_harms && !shaken;
         let first = |causes: [(bool, Trip); 8]| causes.into_iter().find(|(present, _)| *present).map(|(_, trip)| trip);
         let cause = |own: [bool; 6]| {
             let [outside, late, swings, excess, harms, astray] = own;

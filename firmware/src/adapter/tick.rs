@@ -149,7 +149,7 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
         let network = self.ramp.value(interpolation, self.clock.phase(), divisor);
         let wanted_at_all = self.lanes != Lanes::NONE;
         self.starved = self.starved.saturating_add(u32::from(wanted_at_all && preview.reach(tick) < self.ahead));
-        let Verdict { allowed, handover_step } = self.guard.tick(&Observation {
+        let Verdict { allowed, handover_step, share } = self.guard.tick(&Observation {
             lane: card.feedback.as_ref(),
             monitor: model.monitor(),
             wanted: self.lanes,
@@ -172,7 +172,7 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
             network,
             feedback: self.feedback.step(model, tick, preview, &errors, active),
             network_weight: self.network_weight,
-            feedback_weight: self.feedback_weight,
+            feedback_weight: self.feedback_weight * share,
         };
         let acting = self.correction.left() || self.network_weight > 0.0 || self.feedback_weight > 0.0;
         let applied = if acting {

@@ -11,7 +11,12 @@
 //! what it would do without the feedback lane and in full, against no add-on at all, also while it is faded out: it comes back
 //! when it would do good.
 
-use super::{GuardSettings, Monitor, observation::Outcome, watch::ewma_gain};
+use super::{
+    GuardSettings, Monitor,
+    observation::Outcome,
+    swing::{Parts, Swing},
+    watch::ewma_gain,
+};
 use crate::{
     format::{Floats, MAX_AXES, MAX_INPUTS, MAX_OUTPUTS, MAX_TAPS},
     math::{clamp, finite_or_zero},
@@ -19,9 +24,6 @@ use crate::{
 
 /// Bound of the errors that are believed.
 const LARGEST: f32 = 1e9;
-
-/// Recent share of the network lane from which on, and at which, it is relied on.
-const RELIED: [f32; 2] = [0.7, 0.9];
 
 /// One contribution over the last monitor ticks.
 #[derive(Clone, Copy, Debug)]
@@ -73,9 +75,6 @@ pub struct Energies {
     pub network_only: f32,
     /// Without any correction.
     pub baseline: f32,
-    /// That the loop's nominal response to the desired trajectory alone leads to: without disturbances, and whatever the loop
-    /// does.
-    pub nominal: f32,
     /// The same over a longer time: the long-term baseline.
     pub long_term_baseline: f32,
 }
@@ -97,17 +96,8 @@ pub struct Counterfactual {
     desired: [f32; MAX_AXES],
     energies: Energies,
     harmful: [bool; 2],
-    /// Recent share of the network lane.
-    reliance: f32,
-    /// Energy of the error while the loop did not respond to the feedback lane any more: what disturbances and a response other
-    /// than the nominal one lead to; it is forgotten slowly.
-    left_alone: f32,
-    /// Largest energy of the error for which the feedback lane was blamed, while the loop responded to it.
-    blamed: f32,
-    /// The error is worse than it should be,
-    astray: bool,
-    /// and was as bad without the feedback lane.
-    exonerated: bool,
+    /// What swings.
+    swing: Swing,
     /// Something was added since the start, or since all was forgotten.
     busy: bool,
 }
@@ -121,20 +111,9 @@ impl Counterfactual {
         pasts: [[[Past::EMPTY; 3]; MAX_INPUTS]; MAX_AXES],
         references: [[Past::EMPTY; MAX_INPUTS]; MAX_AXES],
         desired: [0.0; MAX_AXES],
-        energies: Energies {
-            with: 0.0,
-            without_feedback: 0.0,
-            network_only: 0.0,
-            baseline: 0.0,
-            nominal: 0.0,
-            long_term_baseline: 0.0,
-        },
+        energies: Energies { with: 0.0, without_feedback: 0.0, network_only: 0.0, baseline: 0.0, long_term_baseline: 0.0 },
         harmful: [false; 2],
-        reliance: 0.0,
-        left_alone: 0.0,
-        blamed: 0.0,
-        astray: false,
-        exonerated: false,
+        swing: Swing::NONE,
         busy: false,
     };
 
@@ -148,15 +127,9 @@ impl Counterfactual {
         self.harmful
     }
 
-    /// Whether the error is worse than the loop would have it without the add-on, were its response the nominal one: it is not,
-    /// or disturbances are large, or the feedback lane shakes it.
-    pub(super) fn astray(&self) -> bool {
-        self.astray
-    }
-
-    /// Whether the error was as bad when the loop did not respond to the feedback lane any more.
-    pub(super) fn exonerated(&self) -> bool {
-        self.exonerated
+    /// What swings, and what the feedback lane does against it.
+    pub(super) fn swing(&self) -> &Swing {
+        &self.swing
     }
 
     /// Forgets everything: no lane has acted for long, or ticks are missing.
@@ -172,18 +145,14 @@ impl Counterfactual {
             *past = Past::EMPTY;
         }
         (self.phase, self.head, self.errors, self.desired) = (0, 0, [0.0; MAX_AXES], [0.0; MAX_AXES]);
-        (self.energies, self.harmful, self.astray, self.busy) = (Energies::default(), [false; 2], false, false);
-        (self.reliance, self.left_alone, self.blamed, self.exonerated) = (0.0, 0.0, 0.0, false);
+        (self.energies, self.harmful, self.busy) = (Energies::default(), [false; 2], false);
+        self.swing = Swing::NONE;
     }
 
     /// Adds a reference tick with the errors of the monitor's axes.
     pub(super) fn observe(&mut self, monitor: &Monitor<'_>, seen: &Outcome, settings: &GuardSettings, rate_hz: f32) {
         let shares = &seen.shares;
-        self.reliance += (seen.network - self.reliance) * ewma_gain(1.0 / (settings.astray_s * rate_hz));
-        // Where less of it acts now, nothing is known of what it leaves.
-        if seen.network < self.reliance {
-            self.reliance = seen.network;
-        }
+        self.swing.rely(seen.network, settings, 1.0 / rate_hz);
         let believed = |value: f32| clamp(finite_or_zero(value), -LARGEST, LARGEST);
         if !self.busy {
             // As if what is desired now had been desired for long.
@@ -227,11 +196,11 @@ impl Counterfactual {
         let mean = 1.0 / ticks;
         self.head = if self.head == 0 { monitor.taps().saturating_sub(1) } else { self.head - 1 };
         let mut now = Energies::default();
+        let mut parts = [Parts::default(); MAX_AXES];
         let [mut acts, mut assisted] = [false; 2];
         let desired = self.references.iter_mut().zip(&mut self.desired);
-        for ((((axis, response), pasts), error), (references, desired)) in
-            monitor.axes().iter().zip(&mut self.pasts).zip(&mut self.errors).zip(desired)
-        {
+        let axes = monitor.axes().iter().zip(&mut self.pasts).zip(&mut self.errors).zip(&mut parts);
+        for (((((axis, response), pasts), error), parts), (references, desired)) in axes.zip(desired) {
             let with = *error * mean;
             *error = 0.0;
             // Relative to what is desired now: a response that ends too early is no error that grows with the position.
@@ -260,19 +229,16 @@ impl Counterfactual {
             now.without_feedback += unaided * unaided;
             now.network_only += (unaided + more) * (unaided + more);
             now.baseline += (unaided - network) * (unaided - network);
-            now.nominal += nominal * nominal;
+            *parts = Parts { with, without: unaided, response: feedback, nominal };
         }
         let weight = |seconds: f32| ewma_gain(ticks / (seconds * rate_hz));
         let recent = weight(settings.counterfactual_s);
         let past = &mut self.energies;
-        // Quickly up, slowly down: the loop may be later than nominal.
-        let slow = if now.nominal > past.nominal { recent } else { weight(settings.astray_s) };
         for (energy, now, weight) in [
             (&mut past.with, now.with, recent),
             (&mut past.without_feedback, now.without_feedback, recent),
             (&mut past.network_only, now.network_only, recent),
             (&mut past.baseline, now.baseline, recent),
-            (&mut past.nominal, now.nominal, slow),
             (&mut past.long_term_baseline, now.baseline, weight(settings.long_term_s)),
         ] {
             *energy = finite_or_zero(*energy + (now - *energy) * weight);
@@ -285,36 +251,7 @@ impl Counterfactual {
         let share = settings.counterfactual_share * settings.counterfactual_share * baseline;
         // While the network acts, what is measured must be worse too.
         let network = worse(past.network_only, baseline, factor) && (!acts || worse(past.with, baseline, factor));
-        self.stray(monitor, settings, assisted, weight);
-        let past = &self.energies;
         self.harmful = [network, worse(past.with, past.without_feedback + share, settings.counterfactual_factor)];
-    }
-
-    /// Compares the error with what the loop's nominal response to the desired trajectory alone leads to or, where the network
-    /// has long acted, with the share of it that such a lane leaves.
-    ///
-    /// Neither depends on how the loop responds now: a loop with more delay than the model knows, in which the feedback lane
-    /// swings, cannot mislead this judge, as it does the counterfactual one. Disturbances can: so the error counts that there was
-    /// when the loop did not respond to the feedback lane any more.
-    fn stray(&mut self, monitor: &Monitor<'_>, settings: &GuardSettings, assisted: bool, weight: impl Fn(f32) -> f32) {
-        let Energies { with, nominal, .. } = self.energies;
-        self.left_alone -= self.left_alone * weight(settings.disturbance_s);
-        if assisted {
-            self.exonerated = false;
-            self.blamed = if self.blamed > 0.0 { self.blamed.max(with) } else { 0.0 };
-        } else if with >= self.blamed {
-            // What the lane left behind dies away; what a disturbance makes is worse without it.
-            self.left_alone = self.left_alone.max(with);
-            self.exonerated = self.blamed > 0.0;
-        }
-        let relied = clamp((self.reliance - RELIED[0]) / (RELIED[1] - RELIED[0]), 0.0, 1.0);
-        let factor = settings.astray_factor + (settings.astray_share - settings.astray_factor) * relied;
-        let floor = settings.astray_floor * monitor.validated_rms();
-        let alone = settings.astray_factor * settings.astray_factor * self.left_alone;
-        let astray = with > (factor * factor * nominal).max(alone) + floor * floor;
-        if astray && !self.astray && assisted {
-            self.blamed = with;
-        }
-        self.astray = astray;
+        self.swing.observe(&parts, monitor.validated_rms(), settings, ticks / rate_hz);
     }
 }

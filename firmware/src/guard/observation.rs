@@ -119,4 +119,6 @@ pub(crate) struct Verdict {
     pub(crate) allowed: Lanes,
     /// Least change of weight in a reference tick of a lane that tripped.
     pub(crate) handover_step: f32,
+    /// Share of the feedback lane that may act, 0..=1.
+    pub(crate) share: f32,
 }

@@ -71,20 +71,32 @@ pub struct GuardSettings {
     pub oscillation_s: f32,
     /// The feedback lane stays off after this many trips by oscillation, until it is armed again: each return would swing again.
     pub oscillation_trips: u16,
-    /// The feedback lane trips when the RMS of the error is more than this factor of what the loop's nominal response to the
-    /// desired trajectory leads to, beyond the floor.
+    /// What is slower than this time constant, s, does not swing: a payload, a steady wind, the integral.
+    pub swing_s: f32,
+    /// The feedback lane acts in full until what swings comes to this share of what makes it trip astray; from there on it acts
+    /// less.
+    pub swing_onset: f32,
+    /// It begins with this share, as the loop's delay is not known yet,
+    pub swing_start: f32,
+    /// and its share may grow by one in this time, s.
+    pub swing_recovery_s: f32,
+    /// The feedback lane trips when what swings of the error is more than this share of what would swing without the lane, beyond
+    /// what the desired trajectory and the floor allow. A lane that damps leaves a half and less.
+    pub astray_left: f32,
+    /// What the loop's nominal response to the desired trajectory leads to allows this factor of it in addition,
     pub astray_factor: f32,
-    /// The same factor where the network lane has acted in full for long: it leaves but a share of that error.
+    /// or this share where the network lane has acted in full for long.
     pub astray_share: f32,
-    /// An error below this many times the model's validated RMS is not astray.
+    /// What swings may be this many times the model's validated RMS in addition.
     pub astray_floor: f32,
-    /// What the nominal response leads to is forgotten with this time constant, s: the loop may be later than nominal.
+    /// A feedback lane whose part of the response swings by less than this share of the error does not lead it astray.
+    pub astray_cause: f32,
+    /// The energies of what swings are exponentially weighted means with this time constant, s.
     pub astray_s: f32,
-    /// The feedback lane stays off after this many trips astray, until it is armed again, or until the error turns out as bad
-    /// without it.
+    /// The network lane has acted in full for long after several times this time constant, s.
+    pub relied_s: f32,
+    /// The feedback lane stays off after this many trips astray, until it is armed again.
     pub astray_trips: u16,
-    /// What the error was without the feedback lane is forgotten with this time constant, s.
-    pub disturbance_s: f32,
 }
 
 impl GuardSettings {
@@ -116,12 +128,18 @@ impl GuardSettings {
         oscillation_power: 0.0,
         oscillation_s: 0.0,
         oscillation_trips: 0,
+        swing_s: 0.0,
+        swing_onset: 0.0,
+        swing_start: 0.0,
+        swing_recovery_s: 0.0,
+        astray_left: 0.0,
         astray_factor: 0.0,
         astray_share: 0.0,
         astray_floor: 0.0,
+        astray_cause: 0.0,
         astray_s: 0.0,
+        relied_s: 0.0,
         astray_trips: 0,
-        disturbance_s: 0.0,
     };
 
     const DEFAULT: Self = Self {
@@ -148,12 +166,18 @@ impl GuardSettings {
         oscillation_power: 0.8,
         oscillation_s: 0.5,
         oscillation_trips: 1,
-        astray_factor: 1.5,
+        swing_s: 0.1,
+        swing_onset: 0.7,
+        swing_start: 0.3,
+        swing_recovery_s: 2.0,
+        astray_left: 0.7,
+        astray_factor: 1.0,
         astray_share: 0.3,
-        astray_floor: 2.0,
-        astray_s: 1.0,
+        astray_floor: 0.6,
+        astray_cause: 0.3,
+        astray_s: 0.2,
+        relied_s: 1.0,
         astray_trips: 2,
-        disturbance_s: 30.0,
     };
 }
 

@@ -9,47 +9,49 @@ use crate::math::clamp;
 /// State of one lane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Watch {
-    tripped: bool,
+    /// What tripped it, while it is tripped: one more than the trip's index, so that nothing is 0 as the rest of a guard that
+    /// has seen nothing.
+    cause: u8,
     /// Reference ticks that must pass without a cause.
     remaining: u32,
     /// Trips since it was armed that the lane itself is to blame for.
     strikes: u16,
-    /// Why it stays off until it is armed again.
-    locked: Option<Trip>,
+    /// It stays off until it is armed again.
+    locked: bool,
 }
 
 impl Watch {
     /// Free to act.
-    pub(super) const ARMED: Self = Self { tripped: false, remaining: 0, strikes: 0, locked: None };
+    pub(super) const ARMED: Self = Self { cause: 0, remaining: 0, strikes: 0, locked: false };
 
     pub(super) fn tripped(&self) -> bool {
-        self.tripped
+        self.cause != 0
+    }
+
+    /// Whether it is tripped, and this is why.
+    pub(super) fn tripped_by(&self, trip: Trip) -> bool {
+        self.cause == code(trip)
     }
 
     /// Clears what the lane itself was to blame for; a running hold time goes on.
     pub(super) fn unlock(&mut self) {
-        (self.strikes, self.locked) = (0, None);
-    }
-
-    /// The lane was not to blame for what locked it out, if it was this.
-    pub(super) fn exonerate(&mut self, trip: Trip) {
-        if self.locked == Some(trip) {
-            self.unlock();
-        }
+        (self.strikes, self.locked) = (0, false);
     }
 
     /// One reference tick with the cause that is present, if any; returns it if it trips the lane now.
     pub(super) fn tick(&mut self, cause: Option<Trip>, hold: u32, settings: &GuardSettings) -> Option<Trip> {
         let Some(trip) = cause else {
             self.remaining = self.remaining.saturating_sub(1);
-            self.tripped &= self.remaining > 0 || self.locked.is_some();
+            if self.remaining == 0 && !self.locked {
+                self.cause = 0;
+            }
             return None;
         };
         self.remaining = hold.max(1);
-        if self.tripped {
+        if self.tripped() {
             return None;
         }
-        self.tripped = true;
+        self.cause = code(trip);
         let most = match trip {
             Trip::Counterfactual => settings.counterfactual_trips,
             Trip::Oscillation => settings.oscillation_trips,
@@ -57,9 +59,14 @@ impl Watch {
             _ => return Some(trip),
         };
         self.strikes = self.strikes.saturating_add(1);
-        self.locked = (self.strikes >= most).then_some(trip);
+        self.locked |= self.strikes >= most;
         Some(trip)
     }
+}
+
+/// What stands for a trip in a [`Watch`].
+fn code(trip: Trip) -> u8 {
+    trip.index() as u8 + 1
 }
 
 /// Gain of an exponentially weighted moving average (EWMA) in a tick, within 0..=1; NaN counts as 1.
