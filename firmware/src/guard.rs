@@ -5,7 +5,8 @@
 //! *source* the Simplex architecture (Sha 2001): a simple loop that is trusted, a complex one that is watched.
 //!
 //! A lane that trips is handed over by fade, and comes back by fade when its cause has been absent for the hold time. A lane that
-//! the counterfactual monitor has tripped several times stays off until it is armed again.
+//! has tripped several times by what it is itself to blame for (saturated, harm, oscillation, astray) stays off until it is armed
+//! again. The feedback lane acts less before it trips astray.
 
 mod counterfactual;
 mod monitor;

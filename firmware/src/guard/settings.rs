@@ -34,6 +34,8 @@ pub struct GuardSettings {
     pub saturated_share: f32,
     /// The share of saturated ticks is an exponentially weighted mean with this time constant, s.
     pub saturated_s: f32,
+    /// A lane stays off after this many trips by saturation, until it is armed again.
+    pub saturated_trips: u16,
     /// The network lane trips after this many inferences in a row that came too late; 0 counts as 1.
     pub late_in_a_row: u16,
     /// A lane trips when the RMS of the error with it is more than this factor of what it would be without the lane, beyond the
@@ -115,6 +117,7 @@ impl GuardSettings {
         stale_s: 0.0,
         saturated_share: 0.0,
         saturated_s: 0.0,
+        saturated_trips: 0,
         late_in_a_row: 0,
         counterfactual_factor: 0.0,
         assisted_factor: 0.0,
@@ -153,6 +156,7 @@ impl GuardSettings {
         stale_s: 0.1,
         saturated_share: 0.5,
         saturated_s: 1.0,
+        saturated_trips: 3,
         late_in_a_row: 5,
         counterfactual_factor: 1.2,
         assisted_factor: 2.0,

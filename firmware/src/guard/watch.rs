@@ -53,6 +53,7 @@ impl Watch {
         }
         self.cause = code(trip);
         let most = match trip {
+            Trip::Saturated => settings.saturated_trips,
             Trip::Counterfactual => settings.counterfactual_trips,
             Trip::Oscillation => settings.oscillation_trips,
             Trip::Astray => settings.astray_trips,
@@ -72,4 +73,43 @@ fn code(trip: Trip) -> u8 {
 /// Gain of an exponentially weighted moving average (EWMA) in a tick, within 0..=1; NaN counts as 1.
 pub(super) fn ewma_gain(share: f32) -> f32 {
     if share >= 0.0 { clamp(share, 0.0, 1.0) } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Trips of a lane at a cause that comes and goes for ever.
+    fn trips(trip: Trip) -> usize {
+        let (mut watch, settings) = (Watch::ARMED, GuardSettings::default());
+        (0..1000).filter(|tick| watch.tick((tick % 10 == 0).then_some(trip), 3, &settings).is_some()).count()
+    }
+
+    #[test]
+    fn what_the_lane_itself_is_to_blame_for_locks_it_out_and_what_comes_from_outside_does_not() {
+        let settings = GuardSettings::default();
+        for (trip, most) in [
+            (Trip::Saturated, settings.saturated_trips),
+            (Trip::Counterfactual, settings.counterfactual_trips),
+            (Trip::Oscillation, settings.oscillation_trips),
+            (Trip::Astray, settings.astray_trips),
+        ] {
+            assert_eq!(trips(trip), usize::from(most), "{trip:?}");
+        }
+        for trip in [Trip::NotFinite, Trip::Stale, Trip::Envelope, Trip::Late] {
+            assert_eq!(trips(trip), 100, "{trip:?}");
+        }
+    }
+
+    #[test]
+    fn a_lane_is_tripped_by_its_first_cause_until_it_comes_back() {
+        let (mut watch, settings) = (Watch::ARMED, GuardSettings::default());
+        watch.tick(Some(Trip::Astray), 3, &settings);
+        assert_eq!(watch.tick(Some(Trip::Stale), 3, &settings), None);
+        assert!(watch.tripped_by(Trip::Astray) && !watch.tripped_by(Trip::Stale));
+        for _ in 0..3 {
+            watch.tick(None, 3, &settings);
+        }
+        assert!(!watch.tripped() && !watch.tripped_by(Trip::Astray));
+    }
 }
