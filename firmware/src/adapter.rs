@@ -82,8 +82,9 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
     acted: bool,
     /// the features since then,
     features: Features,
-    /// and how old the newest measurement is, reference ticks.
+    /// how old the newest measurement is, and for how long it has stood still although it must have changed, reference ticks.
     age: u16,
+    standing: u16,
 }
 
 impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
@@ -116,6 +117,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             acted: false,
             features: Features::Unchanged,
             age: 0,
+            standing: 0,
         }
     }
 
@@ -215,7 +217,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.references.clear(0);
         self.forget_lanes();
         self.features = Features::Unchanged;
-        self.age = 0;
+        (self.age, self.standing) = (0, 0);
         self.guard.reset();
     }
 
@@ -260,6 +262,17 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     /// Tells how many reference ticks ago the newest measurement arrived; 0 from the start.
     pub fn set_age(&mut self, ticks: u16) {
         self.age = ticks;
+    }
+
+    /// Tells for how many reference ticks what is measured has stood still although it must have changed, as the application
+    /// knows; 0 from the start. It counts as an age.
+    pub fn set_standing(&mut self, ticks: u16) {
+        self.standing = ticks;
+    }
+
+    /// Reference ticks in a second of the model that is flown; 0 without one.
+    pub fn rate_hz(&self) -> f32 {
+        self.model.map_or(0.0, |model| model.card().timing.reference_rate_hz)
     }
 
     /// Correction of each output of the model in the last tick.

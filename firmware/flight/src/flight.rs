@@ -4,6 +4,7 @@
 //! panic, a global, or a clock of its own; *source* the loop of Zhou 2017, Fig. 1, with the rates of [`Rates`].
 
 mod clock;
+mod frozen;
 
 use core::num::NonZeroU32;
 
@@ -24,6 +25,7 @@ use crate::{
 
 pub use crate::settings::{Rates, Settings};
 use clock::Clock;
+use frozen::Frozen;
 
 /// Samples of the desired trajectory that the flight stack keeps: 1.92 s at 100 Hz.
 pub const PREVIEW: usize = 192;
@@ -97,6 +99,7 @@ pub struct Flight<'m> {
     clock: Clock,
     /// The newest state that a vehicle can be in.
     state: Option<State>,
+    frozen: Frozen,
 }
 
 impl<'m> Flight<'m> {
@@ -114,6 +117,7 @@ impl<'m> Flight<'m> {
             dither: Vector3::new(0.0, 0.0, 0.0),
             clock: Clock::EMPTY,
             state: None,
+            frozen: Frozen::EMPTY,
         }
     }
 
@@ -148,8 +152,7 @@ impl<'m> Flight<'m> {
         }
         self.add_on.reset(0);
         (self.wanted, self.reference, self.dither) = (ThrustVector::NONE, Reference::ORIGIN, Vector3::zeros());
-        self.clock = Clock::EMPTY;
-        self.state = None;
+        (self.clock, self.state, self.frozen) = (Clock::EMPTY, None, Frozen::EMPTY);
     }
 
     /// Puts an add-on before the configured loops, with the lanes given, in the place of the one that was there. The trajectory
@@ -282,10 +285,8 @@ impl<'m> Flight<'m> {
 
     /// [`Flight::control`] that puts the job, if there is one, where the caller has room for it: `true`.
     pub fn control_into(&mut self, tick: Tick, state: &State, job: &mut Job) -> (MotorCommand, bool) {
-        match self.known(state) {
-            Some(state) => self.control_known(tick, &state, job),
-            None => (MotorCommand::OFF, false),
-        }
+        let Some(state) = self.known(state) else { return (MotorCommand::OFF, false) };
+        self.control_known(tick, &state, job)
     }
 
     /// [`Flight::control_into`] for a state that was checked.
@@ -316,10 +317,8 @@ impl<'m> Flight<'m> {
         job: &mut Job,
         path: impl FnOnce(&mut [f32; MAX_AXES]),
     ) -> (Option<ThrustVector>, bool) {
-        match self.known(state) {
-            Some(state) => self.position_part(tick, &state, job, path),
-            None => (None, false),
-        }
+        let Some(state) = self.known(state) else { return (None, false) };
+        self.position_part(tick, &state, job, path)
     }
 
     fn position_part(
@@ -340,7 +339,7 @@ impl<'m> Flight<'m> {
         }
         let reference_tick = self.clock.reference;
         let (reference, released) = if corrected {
-            adapted(&mut self.add_on, reference_tick, state, job, path)
+            adapted(&mut self.add_on, &mut self.frozen, reference_tick, state, job, path)
         } else {
             (desired(&self.add_on, reference_tick), false)
         };
@@ -374,6 +373,7 @@ impl<'m> Flight<'m> {
 /// The corrected reference at a reference tick, and whether the network has a job.
 fn adapted(
     add_on: &mut QuadrotorAddOn<'_>,
+    frozen: &mut Frozen,
     tick: i32,
     state: &State,
     job: &mut Job,
@@ -381,6 +381,7 @@ fn adapted(
 ) -> (Reference, bool) {
     let measured = quadrotor::measured(state);
     let (adapter, preview) = add_on.parts();
+    frozen.tell(adapter, state, &preview.sample(tick));
     let released = adapter.begin_into(tick, preview, &measured, job);
     let reference = adapter.finish_through(tick, preview, &measured, path);
     let [.., yaw] = preview.sample(tick);

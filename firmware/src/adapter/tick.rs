@@ -158,7 +158,7 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
             finite: finite(&desired),
             bad: self.bad,
             late: self.ramp.late_in_a_row(),
-            age: self.age,
+            age: self.age.max(self.standing),
             trajectory: !preview.is_empty(),
         });
         // The network lane has a value from its first sub-rate tick on: a fade that began before would end in a step.
