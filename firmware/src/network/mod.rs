@@ -202,12 +202,26 @@ impl<'a> Network<'a> {
     #[inline(always)]
     fn denormalise(&self, values: impl Iterator<Item = f32>, outputs: &mut [f32]) {
         let denormalisation = self.output_scale.iter().zip(self.output_mean.iter());
+        let mut sum = 0.0;
         for ((output, value), (scale, mean)) in outputs.iter_mut().zip(values).zip(denormalisation) {
             let skip = if self.skip.is_some() { *output } else { 0.0 };
-            let value = (skip + value) * scale + mean;
-            // Neither NaN nor an infinity, nor a number that would make one of the next: none of it was meant, so no correction.
-            *output = if abs(value) <= ranges::MAGNITUDE { value } else { 0.0 };
+            *output = (skip + value) * scale + mean;
+            sum += abs(*output);
         }
+        // One comparison for all: a sum of magnitudes that is small has no large one, and none that is no number.
+        let small = sum <= ranges::MAGNITUDE;
+        if !small {
+            leave_out(outputs, self.output_scale.len());
+        }
+    }
+}
+
+/// Neither NaN nor an infinity, nor a number that would make one of the next: none of it was meant, so no correction.
+#[cold]
+#[inline(never)]
+fn leave_out(outputs: &mut [f32], count: usize) {
+    for output in outputs.iter_mut().take(count) {
+        *output = if abs(*output) <= ranges::MAGNITUDE { *output } else { 0.0 };
     }
 }
 
