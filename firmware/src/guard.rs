@@ -15,7 +15,7 @@ mod settings;
 mod trip;
 mod watch;
 
-use crate::{lanes::Lanes, math::abs};
+use crate::lanes::Lanes;
 
 pub use counterfactual::Counterfactual;
 pub use monitor::Monitor;
@@ -203,9 +203,4 @@ impl Guard {
             }
         }
     }
-}
-
-/// Whether all channels are finite numbers.
-pub(crate) fn finite(channels: &[f32]) -> bool {
-    channels.iter().all(|channel| abs(*channel) < f32::INFINITY)
 }

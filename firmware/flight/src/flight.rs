@@ -263,10 +263,9 @@ impl<'m> Flight<'m> {
     /// One control tick, the network included. A state that no vehicle can be in ([`State::is_physical`]) is a missed sample: the
     /// one before it stays, and until there has been one the motors are off.
     pub fn step<const S: usize>(&mut self, tick: Tick, state: &State, scratch: &mut Scratch<S>) -> MotorCommand {
-        let (command, job) = self.control(tick, state);
-        if let Some(job) = job
-            && let Some(network) = self.add_on.model().and_then(Model::network)
-        {
+        let mut job = Job::EMPTY;
+        let (command, released) = self.control_into(tick, state, &mut job);
+        if released && let Some(network) = self.add_on.model().and_then(Model::network) {
             self.deliver(job.run(network, scratch));
         }
         command
@@ -383,7 +382,7 @@ fn adapted(
     let (adapter, preview) = add_on.parts();
     let released = adapter.begin_into(tick, preview, &measured, job);
     let reference = adapter.finish_through(tick, preview, &measured, path);
-    let [.., yaw] = preview.sample(tick);
+    let yaw = preview.channel(tick, DESIRED - 1);
     (quadrotor::reference(&reference, yaw), released)
 }
 
