@@ -189,8 +189,8 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
             self.correction.clear(card, &wanted, &mut self.outcome)
         };
         self.feedback.applied(model, &applied);
-        // What the guard learns of it begins one reference tick after a sub-rate tick: where it sums up as often as the network is
-        // evaluated, no tick pays for both.
+        // What the guard learns of it begins one reference tick after a sub-rate tick: where it sums up as often as the network
+        // is evaluated, no tick pays for both.
         let turn = self.acted || self.clock.phase() == 1 % divisor;
         self.acted = turn && (acting || self.lanes != Lanes::NONE);
         if self.acted {
