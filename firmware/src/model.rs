@@ -35,6 +35,8 @@ impl<'a> Model<'a> {
     pub const EMPTY: Self = Self::empty();
 
     /// [`Model::EMPTY`], made where it is called: a few words are written, what no list has yet is not.
+    // Apart from where it is put, whose stack frame need not hold its parts beside it.
+    #[inline(never)]
     pub const fn empty() -> Self {
         Self {
             card: Card::empty(),

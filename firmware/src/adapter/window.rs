@@ -23,6 +23,7 @@ fn along(feature: &Feature) -> bool {
 
 /// For each desired channel the reciprocal of what it may move by in a sub-rate tick: what training moved by, the guard's margin
 /// beyond it, and its floor.
+#[inline(never)]
 pub(super) fn paces<const D: usize>(
     card: &Card<'_>,
     (low, high): &(Floats<'_>, Floats<'_>),
