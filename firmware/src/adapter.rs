@@ -20,7 +20,7 @@ use crate::{
     caps::{Bounds, Caps},
     features,
     format::{Channels, EndRule, MAX_OUTPUTS, Refusal},
-    guard::{Features, Guard, GuardSettings, Outcome, Trips, finite},
+    guard::{Features, Guard, GuardSettings, Outcome, Trips},
     model::Model,
     network::Scratch,
     preview::Preview,
@@ -62,8 +62,8 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
     correction: Correction<R>,
     /// What the application lets the correction be.
     bounds: Bounds<R>,
-    /// Largest change in a sub-rate tick of each desired channel in training.
-    changes: [f32; D],
+    /// Of each desired channel the reciprocal of what a window of it may move by in a sub-rate tick.
+    paces: [f32; D],
     /// The newest measurement that was one,
     good: Option<[f32; M]>,
     /// and how many reference ticks in a row brought none since.
@@ -106,7 +106,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             feedback_weight: 0.0,
             correction: Correction::NONE,
             bounds: Bounds::EMPTY,
-            changes: [0.0; D],
+            paces: [0.0; D],
             good: None,
             bad: 0,
             held: None,
@@ -169,7 +169,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.guard.load(GuardSettings::default(), rate_hz);
         self.bounds.load(caps, rate_hz);
         self.ahead = model.card().preview_span().1 as i32;
-        self.changes = window::changes(model.card(), &model.envelope());
+        self.paces = window::paces(model.card(), &model.envelope(), self.guard.settings());
         self.know(table);
         self.deferred = false;
         self.restart();
@@ -252,6 +252,9 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     /// Sets the guard, which is on with [`GuardSettings::default`] from the start.
     pub fn set_guard(&mut self, settings: GuardSettings) {
         self.guard.set(settings);
+        if let Some(model) = self.model {
+            self.paces = window::paces(model.card(), &model.envelope(), self.guard.settings());
+        }
     }
 
     /// Lets lanes act again that the guard has locked out.

@@ -67,15 +67,14 @@ pub struct Caps<'a> {
 /// The bounds as the adapter keeps them.
 #[derive(Clone, Debug)]
 pub(crate) struct Bounds<const R: usize> {
-    channels: [Cap; R],
+    /// Largest absolute correction of each channel, and largest change of it in a reference tick.
+    channels: [(f32, f32); R],
     sums: Vec<SumCap, MAX_AXES>,
-    /// Reference ticks in a second.
-    rate_hz: f32,
 }
 
 impl<const R: usize> Bounds<R> {
     /// Nothing is corrected: all zeros.
-    pub(crate) const EMPTY: Self = Self { channels: [Cap { limit: 0.0, rate: 0.0 }; R], sums: Vec::new(), rate_hz: 0.0 };
+    pub(crate) const EMPTY: Self = Self { channels: [(0.0, 0.0); R], sums: Vec::new() };
 
     /// Whether these are bounds of a loop with so many reference channels.
     ///
@@ -106,24 +105,19 @@ impl<const R: usize> Bounds<R> {
     /// Takes checked bounds of a loop with this many reference ticks in a second.
     pub(crate) fn load(&mut self, caps: &Caps<'_>, rate_hz: f32) {
         for (index, place) in self.channels.iter_mut().enumerate() {
-            *place = caps.channels.get(index).copied().unwrap_or(Cap { limit: 0.0, rate: 0.0 });
+            let Cap { limit, rate } = caps.channels.get(index).copied().unwrap_or(Cap { limit: 0.0, rate: 0.0 });
+            *place = (limit, if rate_hz > 0.0 { rate / rate_hz } else { 0.0 });
         }
         self.sums.clear();
         for sum in caps.sums {
             let _ = self.sums.push(*sum);
         }
-        self.rate_hz = rate_hz;
     }
 
-    /// Largest change of a channel's correction in a reference tick.
-    pub(crate) fn slew(&self, channel: usize) -> f32 {
-        let rate = self.channels.get(channel).map_or(0.0, |cap| cap.rate);
-        if self.rate_hz > 0.0 { rate / self.rate_hz } else { 0.0 }
-    }
-
-    /// Largest absolute correction of a channel.
-    pub(crate) fn limit(&self, channel: usize) -> f32 {
-        self.channels.get(channel).map_or(0.0, |cap| cap.limit)
+    /// Largest absolute correction of a channel, and largest change of it in a reference tick.
+    #[inline]
+    pub(crate) fn channel(&self, channel: usize) -> (f32, f32) {
+        self.channels.get(channel).copied().unwrap_or((0.0, 0.0))
     }
 
     /// Bounds the sums of a correction that is within its limits, on its way from the `last` one, which is within all of them.

@@ -191,7 +191,9 @@ fn dot(coefficients: Floats<'_>, values: &[f32; MAX_LAGS], offset: f32) -> f32 {
             *sum += coefficient * (value - offset);
         }
     }
-    let tail = coefficients.iter().zip(values).skip(whole);
+    // Split off: to skip the blocks would be to go through them again.
+    let (_, tail) = coefficients.split_at(whole);
+    let tail = tail.iter().zip(values.get(whole..).unwrap_or_default());
     let rest = tail.fold(0.0, |sum, (coefficient, value)| sum + coefficient * (value - offset));
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }

@@ -17,7 +17,7 @@ mod swing;
 mod trip;
 mod watch;
 
-use crate::{lanes::Lanes, math::abs};
+use crate::lanes::Lanes;
 
 pub use counterfactual::Counterfactual;
 pub use monitor::Monitor;
@@ -209,9 +209,4 @@ impl Guard {
             }
         }
     }
-}
-
-/// Whether all channels are finite numbers.
-pub(crate) fn finite(channels: &[f32]) -> bool {
-    channels.iter().all(|channel| abs(*channel) < f32::INFINITY)
 }

@@ -30,18 +30,26 @@ pub struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
-    /// No model: where [`Model::load_into`] puts one.
-    pub const EMPTY: Self = Self {
-        card: Card::EMPTY,
-        blob: Blob::new(&[]),
-        network: None,
-        feedback: None,
-        monitor: None,
-        envelope: (Floats::EMPTY, Floats::EMPTY),
-        bounds: Bounds::EMPTY,
-        checksum: 0,
-        file: &[],
-    };
+    /// No model: where [`Model::load_into`] puts one. A static that starts with it has 4 KB of flash for its few numbers that are
+    /// not zero; made at run time, by [`Model::empty`], it has none.
+    pub const EMPTY: Self = Self::empty();
+
+    /// [`Model::EMPTY`], made where it is called: a few words are written, what no list has yet is not.
+    // Apart from where it is put, whose stack frame need not hold its parts beside it.
+    #[inline(never)]
+    pub const fn empty() -> Self {
+        Self {
+            card: Card::empty(),
+            blob: Blob::new(&[]),
+            network: None,
+            feedback: None,
+            monitor: None,
+            envelope: (Floats::EMPTY, Floats::EMPTY),
+            bounds: Bounds::EMPTY,
+            checksum: 0,
+            file: &[],
+        }
+    }
 
     /// Checks a model file and borrows its numbers.
     ///

@@ -95,40 +95,60 @@ impl<const D: usize, const N: usize> Preview<D, N> {
     /// One channel at a tick.
     #[inline]
     pub fn channel(&self, tick: i32, channel: usize) -> f32 {
-        let (slot, inside) = self.locate(tick);
-        match (inside, self.rules.get(channel)) {
-            (true, Some(_)) | (false, Some(EndRule::Hold)) => {
-                self.samples.get(slot).and_then(|sample| sample.get(channel)).copied().unwrap_or(0.0)
-            }
-            _ => 0.0,
+        match self.place(tick) {
+            Some(place) => self.samples.get(place).and_then(|sample| sample.get(channel)).copied().unwrap_or(0.0),
+            None => self.channel_beyond(tick, channel),
         }
     }
 
     /// All channels at a tick.
     #[inline]
     pub fn sample(&self, tick: i32) -> [f32; D] {
-        let (slot, inside) = self.locate(tick);
-        let mut sample = self.samples.get(slot).copied().unwrap_or([0.0; D]);
-        if !inside {
-            for (value, rule) in sample.iter_mut().zip(&self.rules) {
-                if *rule == EndRule::Zero {
-                    *value = 0.0;
-                }
+        match self.place(tick) {
+            Some(place) => self.samples.get(place).copied().unwrap_or([0.0; D]),
+            None => self.sample_beyond(tick),
+        }
+    }
+
+    /// Place of the sample of a tick, if it is stored.
+    #[inline(always)]
+    fn place(&self, tick: i32) -> Option<usize> {
+        // The newest one is one back. What comes later wraps, so that one comparison tells both ends.
+        let back = self.next.wrapping_sub(tick) as usize;
+        let within = back.wrapping_sub(1) < self.stored;
+        within.then(|| if self.slot < back { (self.slot + N).wrapping_sub(back) } else { self.slot - back })
+    }
+
+    /// The stored sample that is nearest to a tick which is not stored, if there is one.
+    #[inline(always)]
+    fn nearest(&self, tick: i32) -> Option<&[f32; D]> {
+        if self.stored == 0 {
+            return None;
+        }
+        let back = if self.next.wrapping_sub(tick) <= 0 { 1 } else { self.stored };
+        self.samples.get(if self.slot < back { (self.slot + N).wrapping_sub(back) } else { self.slot - back })
+    }
+
+    /// A channel at a tick that is not stored. This and the next are functions of their own, apart from what is asked for of each
+    /// feature in each flight.
+    #[inline(never)]
+    fn channel_beyond(&self, tick: i32, channel: usize) -> f32 {
+        match self.rules.get(channel) {
+            Some(EndRule::Hold) => self.nearest(tick).and_then(|sample| sample.get(channel)).copied().unwrap_or(0.0),
+            _ => 0.0,
+        }
+    }
+
+    /// All channels at a tick that is not stored.
+    #[inline(never)]
+    fn sample_beyond(&self, tick: i32) -> [f32; D] {
+        let mut sample = self.nearest(tick).copied().unwrap_or([0.0; D]);
+        for (value, rule) in sample.iter_mut().zip(&self.rules) {
+            if *rule == EndRule::Zero {
+                *value = 0.0;
             }
         }
         sample
-    }
-
-    /// Place of the stored sample nearest to `tick`, one that does not exist if there is none, and whether it is that of `tick`.
-    #[inline]
-    fn locate(&self, tick: i32) -> (usize, bool) {
-        let wanted = self.next.wrapping_sub(tick);
-        let back = wanted.max(1).min(self.stored as i32);
-        if back == 0 {
-            return (N, false);
-        }
-        let slot = if self.slot < back as usize { self.slot + N } else { self.slot };
-        (slot - back as usize, back == wanted)
     }
 }
 

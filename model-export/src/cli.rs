@@ -3,6 +3,7 @@
 //! *in* arguments; *out* results on stdout, messages on stderr, an exit code; *never* a file that is half written, or a file
 //! replaced when something failed.
 
+mod ambiguous;
 mod export;
 mod files;
 mod format;
@@ -21,6 +22,7 @@ use impromptu_files::text::line;
 use impromptu_firmware::model::Model;
 
 use self::{
+    ambiguous::Ambiguous,
     export::Export,
     files::{read, unsigned},
     format::Format,
@@ -83,18 +85,6 @@ enum Command {
     /// Signs a model file for vehicles that store signed models only.
     Sign(Sign),
 }
-
-/// What can be meant in two ways; names the option that settles it.
-#[derive(Debug)]
-struct Ambiguous(String);
-
-impl std::fmt::Display for Ambiguous {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for Ambiguous {}
 
 /// Runs the program on `arguments` (the first of them is its name). Returns the exit code.
 pub fn run<I, T>(arguments: I, out: &mut dyn Write, messages: &mut dyn Write) -> u8

@@ -25,7 +25,8 @@
 //! |---|---|---|
 //! | 1 | `float_network`, `rows`, `signing` | tensors, rows; keys, signed models |
 //! | 2 | `description` | their meaning, and which network and rows belong to it |
-//! | 2 | `export_error`, `integer_network`, `inspection` | failures; layers in integers; a file for people |
+//! | 2 | `export_error`, `integer_network` | failures; layers in integers |
+//! | 3 | `inspection` | a file for people |
 //! | 3 | `packing` | layers in the order in which the kernels stream them |
 //! | 4 | `stored_network` | the network of a model file, unpacked |
 //! | 5 | `batch`, `bounds` | many rows at once with the bits of one; proven ranges, differences, slopes |

@@ -60,32 +60,14 @@ impl Loops {
     }
 }
 
-/// What is configured and attached. The add-on has a model exactly if this is [`Stage::Adapted`], and a model that fits these
-/// loops.
+/// What is configured and attached: with an add-on exactly if that has a model, which then fits these loops. Not an `enum` of
+/// three: to go from one to another would be to copy the loops by way of the stack.
 #[derive(Debug)]
-enum Stage {
-    /// Nothing is known of a vehicle: its motors are off.
-    Empty,
-    /// The loops alone.
-    Baseline(Loops),
-    /// The loops with the add-on before them.
-    Adapted(Loops),
-}
-
-impl Stage {
-    fn loops(&self) -> Option<&Loops> {
-        match self {
-            Self::Empty => None,
-            Self::Baseline(loops) | Self::Adapted(loops) => Some(loops),
-        }
-    }
-
-    fn loops_mut(&mut self) -> Option<&mut Loops> {
-        match self {
-            Self::Empty => None,
-            Self::Baseline(loops) | Self::Adapted(loops) => Some(loops),
-        }
-    }
+struct Stage {
+    /// `None`: nothing is known of a vehicle, and its motors are off.
+    loops: Option<Loops>,
+    /// The loops have the add-on before them.
+    adapted: bool,
 }
 
 /// The baseline loop with, if a model is attached, the add-on before it.
@@ -107,7 +89,7 @@ impl<'m> Flight<'m> {
     /// a static and [configures](Flight::configure) it there.
     pub const fn empty() -> Self {
         Self {
-            stage: Stage::Empty,
+            stage: Stage { loops: None, adapted: false },
             add_on: QuadrotorAddOn::empty(),
             wanted: ThrustVector {
                 force: Vector3::new(0.0, 0.0, 0.0),
@@ -133,11 +115,11 @@ impl<'m> Flight<'m> {
     /// is detached.
     pub fn configure(&mut self, settings: &Settings) -> bool {
         let Some(loops) = Loops::new(settings) else { return false };
-        if self.add_on.model().is_some_and(|model| Self::accepts(model, &settings.rates).is_ok()) {
-            self.stage = Stage::Adapted(loops);
+        self.stage.loops = Some(loops);
+        self.stage.adapted = self.add_on.model().is_some_and(|model| Self::accepts(model, &settings.rates).is_ok());
+        if self.stage.adapted {
             self.add_on.restart(0);
         } else {
-            self.stage = Stage::Baseline(loops);
             let _ = self.add_on.bypass(quadrotor::signals());
         }
         self.reset();
@@ -147,7 +129,7 @@ impl<'m> Flight<'m> {
     /// Back on the ground: the next setpoint is that of reference tick 0, and nothing is left of the last flight but the lanes
     /// that are wanted and the counts.
     pub fn reset(&mut self) {
-        if let Some(loops) = self.stage.loops_mut() {
+        if let Some(loops) = &mut self.stage.loops {
             loops.position.reset();
         }
         self.add_on.reset(0);
@@ -162,18 +144,21 @@ impl<'m> Flight<'m> {
     /// If the model is for other signals, another rate, or a longer preview; what was attached then stays. A flight stack without
     /// settings has a rate of 0.
     pub fn attach(&mut self, model: &'m Model<'m>, lanes: Lanes) -> Result<(), Refusal> {
-        Self::accepts(model, &self.stage.loops().map_or(Rates::NONE, |loops| loops.rates))?;
-        let sums = self.stage.loops().map(|loops| caps::sums(loops.position.gains()));
+        Self::accepts(model, &self.stage.loops.as_ref().map_or(Rates::NONE, |loops| loops.rates))?;
+        self.place(model);
         let (adapter, _) = self.add_on.parts();
-        let caps = Caps { channels: &caps::CHANNELS, sums: sums.as_ref().map_or(&[], |sums| sums) };
-        adapter.load(model, &quadrotor::signals(), &caps);
         adapter.defer();
         adapter.switch(lanes);
-        self.stage = match core::mem::replace(&mut self.stage, Stage::Empty) {
-            Stage::Empty => Stage::Empty,
-            Stage::Baseline(loops) | Stage::Adapted(loops) => Stage::Adapted(loops),
-        };
+        self.stage.adapted = self.stage.loops.is_some();
         Ok(())
+    }
+
+    /// Gives the adapter an accepted model, apart from the check, which needs none of its stack.
+    #[inline(never)]
+    fn place(&mut self, model: &'m Model<'m>) {
+        let sums = self.stage.loops.as_ref().map(|loops| caps::sums(loops.position.gains()));
+        let caps = Caps { channels: &caps::CHANNELS, sums: sums.as_ref().map_or(&[], |sums| sums) };
+        self.add_on.parts().0.load(model, &quadrotor::signals(), &caps);
     }
 
     /// Takes the add-on away: the loops fly alone. The trajectory stays.
@@ -181,10 +166,7 @@ impl<'m> Flight<'m> {
         let (adapter, _) = self.add_on.parts();
         // The table's references all have the names of desired channels.
         let _ = adapter.bypass(&quadrotor::signals());
-        self.stage = match core::mem::replace(&mut self.stage, Stage::Empty) {
-            Stage::Empty => Stage::Empty,
-            Stage::Baseline(loops) | Stage::Adapted(loops) => Stage::Baseline(loops),
-        };
+        self.stage.adapted = false;
     }
 
     /// Whether [`Flight::attach`] takes a model, once configured with these rates.
@@ -199,10 +181,7 @@ impl<'m> Flight<'m> {
 
     /// The add-on, if there is one.
     pub fn adapter(&mut self) -> Option<&mut QuadrotorAdapter<'m>> {
-        match self.stage {
-            Stage::Adapted(_) => Some(self.add_on.parts().0),
-            Stage::Empty | Stage::Baseline(_) => None,
-        }
+        self.stage.adapted.then(|| self.add_on.parts().0)
     }
 
     /// Appends the desired state of the next reference tick; `false`, and nothing changes, if no vehicle can be asked for it
@@ -244,7 +223,7 @@ impl<'m> Flight<'m> {
 
     /// Reference tick of a control tick.
     pub fn reference_tick(&self, tick: Tick) -> i32 {
-        let divisor = self.stage.loops().map_or(NonZeroU32::MIN, |loops| loops.position_divisor);
+        let divisor = self.stage.loops.as_ref().map_or(NonZeroU32::MIN, |loops| loops.position_divisor);
         self.clock.at(tick.0, divisor).reference
     }
 
@@ -266,10 +245,9 @@ impl<'m> Flight<'m> {
     /// One control tick, the network included. A state that no vehicle can be in ([`State::is_physical`]) is a missed sample: the
     /// one before it stays, and until there has been one the motors are off.
     pub fn step<const S: usize>(&mut self, tick: Tick, state: &State, scratch: &mut Scratch<S>) -> MotorCommand {
-        let (command, job) = self.control(tick, state);
-        if let Some(job) = job
-            && let Some(network) = self.add_on.model().and_then(Model::network)
-        {
+        let mut job = Job::EMPTY;
+        let (command, released) = self.control_into(tick, state, &mut job);
+        if released && let Some(network) = self.add_on.model().and_then(Model::network) {
             self.deliver(job.run(network, scratch));
         }
         command
@@ -289,7 +267,8 @@ impl<'m> Flight<'m> {
         self.control_known(tick, &state, job)
     }
 
-    /// [`Flight::control_into`] for a state that was checked.
+    /// [`Flight::control_into`] for a state that was checked. What else a tick does needs none of its stack.
+    #[inline(never)]
     pub(crate) fn control_known(&mut self, tick: Tick, state: &State, job: &mut Job) -> (MotorCommand, bool) {
         let (wanted, released) = self.position_part(tick, state, job, |_| ());
         if let Some(wanted) = wanted {
@@ -328,17 +307,13 @@ impl<'m> Flight<'m> {
         job: &mut Job,
         path: impl FnOnce(&mut [f32; MAX_AXES]),
     ) -> (Option<ThrustVector>, bool) {
-        let (loops, corrected) = match &mut self.stage {
-            Stage::Empty => return (None, false),
-            Stage::Baseline(loops) => (loops, false),
-            Stage::Adapted(loops) => (loops, true),
-        };
+        let Stage { loops: Some(loops), adapted: corrected } = &mut self.stage else { return (None, false) };
         self.clock = self.clock.at(tick.0, loops.position_divisor);
         if self.clock.phase != 0 {
             return (None, false);
         }
         let reference_tick = self.clock.reference;
-        let (reference, released) = if corrected {
+        let (reference, released) = if *corrected {
             adapted(&mut self.add_on, &mut self.frozen, reference_tick, state, job, path)
         } else {
             (desired(&self.add_on, reference_tick), false)
@@ -359,7 +334,7 @@ impl<'m> Flight<'m> {
     }
 
     fn attitude_part(&self, wanted: &ThrustVector, state: &State) -> MotorCommand {
-        let Some(loops) = self.stage.loops() else { return MotorCommand::OFF };
+        let Some(loops) = self.stage.loops.as_ref() else { return MotorCommand::OFF };
         let (thrust, moment) = loops.attitude.step(wanted, state);
         loops.mixer.mix(thrust, &moment)
     }
@@ -384,7 +359,7 @@ fn adapted(
     frozen.tell(adapter, state, &preview.sample(tick));
     let released = adapter.begin_into(tick, preview, &measured, job);
     let reference = adapter.finish_through(tick, preview, &measured, path);
-    let [.., yaw] = preview.sample(tick);
+    let yaw = preview.channel(tick, DESIRED - 1);
     (quadrotor::reference(&reference, yaw), released)
 }
 

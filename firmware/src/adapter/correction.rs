@@ -80,9 +80,10 @@ impl<const R: usize> Correction<R> {
         let mut targets = [0.0; R];
         for (output, (network, feedback)) in card.outputs.iter().zip(lanes.clone()) {
             let channel = usize::from(output.channel);
-            let limit = least(output.limit, bounds.limit(channel));
+            let (limit, most) = bounds.channel(channel);
+            let limit = least(output.limit, limit);
             if let (Some(target), Some(slew)) = (targets.get_mut(channel), self.slews.get_mut(channel)) {
-                *slew = least(output.slew, bounds.slew(channel));
+                *slew = least(output.slew, most);
                 *target = clamp(network * wanted.network_weight + feedback.unwrap_or(0.0), -limit, limit);
             }
         }

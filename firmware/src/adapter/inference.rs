@@ -14,7 +14,7 @@ use crate::{
 pub struct Job {
     /// Reference tick at which it was released.
     pub tick: i32,
-    /// The model's features, in physical units; zeros behind the last.
+    /// The model's features, in physical units; what is behind the last is not read.
     pub inputs: [f32; MAX_FEATURES],
 }
 

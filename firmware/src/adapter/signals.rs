@@ -4,7 +4,7 @@
 //! application's; *source* the signal tables of [`crate::format`].
 
 use crate::{
-    features::Signals,
+    features::{Signals, Source},
     format::{Card, Channels, EndRule, HISTORY, Refusal},
     preview::Preview,
 };
@@ -12,23 +12,15 @@ use crate::{
 /// Values at sub-rate ticks; what is older or newer than stored gives the nearest.
 pub(super) type History<const C: usize> = Preview<C, HISTORY>;
 
-/// What the features of one inference see.
+/// What the features of one inference see, all of which are asked for at one sub-rate tick.
 pub(super) struct View<'a, const D: usize, const M: usize, const R: usize, const N: usize> {
     pub(super) desired: &'a Preview<D, N>,
+    /// The desired channels at that tick, which every relative feature of a window asks for,
+    pub(super) origin: [f32; D],
     pub(super) measured: &'a History<M>,
     pub(super) references: &'a History<R>,
-    pub(super) divisor: i32,
-    /// Reference tick of the newest sub-rate tick, and its number, by which the histories are addressed.
-    pub(super) now: i32,
+    /// and its number, by which the histories are addressed.
     pub(super) sub_tick: i32,
-}
-
-impl<const D: usize, const M: usize, const R: usize, const N: usize> View<'_, D, M, R, N> {
-    /// Number of the newest sub-rate tick at or before a reference tick.
-    #[inline]
-    fn sub_tick(&self, tick: i32) -> i32 {
-        self.sub_tick.wrapping_add(tick.wrapping_sub(self.now).div_euclid(self.divisor.max(1)))
-    }
 }
 
 impl<const D: usize, const M: usize, const R: usize, const N: usize> Signals for View<'_, D, M, R, N> {
@@ -37,12 +29,22 @@ impl<const D: usize, const M: usize, const R: usize, const N: usize> Signals for
         self.desired.channel(tick, channel)
     }
     #[inline]
-    fn measured(&self, tick: i32, channel: usize) -> f32 {
-        self.measured.channel(self.sub_tick(tick), channel)
+    fn measured(&self, _: i32, channel: usize) -> f32 {
+        self.measured.channel(self.sub_tick, channel)
     }
     #[inline]
-    fn reference(&self, tick: i32, channel: usize) -> f32 {
-        self.references.channel(self.sub_tick(tick), channel)
+    fn reference(&self, _: i32, channel: usize) -> f32 {
+        self.references.channel(self.sub_tick, channel)
+    }
+    #[inline(always)]
+    fn at(&self, source: Source, tick: i32, offset: i16, divisor: i32, channel: usize) -> f32 {
+        let sub_tick = self.sub_tick.wrapping_add(i32::from(offset));
+        match source {
+            Source::Desired if offset == 0 => self.origin.get(channel).copied().unwrap_or(0.0),
+            Source::Desired => self.desired.channel(tick.wrapping_add(i32::from(offset).wrapping_mul(divisor)), channel),
+            Source::Measured => self.measured.channel(sub_tick, channel),
+            Source::Reference => self.references.channel(sub_tick, channel),
+        }
     }
 }
 

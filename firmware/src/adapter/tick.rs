@@ -3,13 +3,12 @@
 //! *in* the desired trajectory and what is measured; *out* a job for the network at a sub-rate tick, and the reference; *never* a
 //! lane that acts on what the guard has not seen; *source* Zhou 2017, Fig. 1.
 
-use super::{
-    Adapter, EndRule, Fade, HISTORY, Inference, Job, Lanes, Preview, Scratch, View, Wanted, features, feedback, finite, window,
-};
+use super::{Adapter, EndRule, Fade, HISTORY, Inference, Job, Lanes, Preview, Scratch, View, Wanted, features, feedback, window};
 use crate::{
-    format::{Card, Interpolation, MAX_AXES, MAX_FEATURES},
+    features::Signals,
+    format::{Card, Feature, Interpolation, MAX_AXES},
     guard::{Features, Observation, Verdict},
-    math::finite_or_zero,
+    math::{all_finite, finite_or_zero},
     model::Model,
 };
 
@@ -48,10 +47,10 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
         if self.clock.advance(tick, divisor) {
             self.ramp.hold();
         }
-        let Some(measured) = self.sane(measured) else { return false };
         if self.clock.phase() != 0 {
             return false;
         }
+        let Some(measured) = self.sane(measured) else { return false };
         self.catch_up(tick, preview);
         self.measured.push(measured);
         if !(self.lanes.network || self.network_weight > 0.0) || model.network().is_none() {
@@ -60,28 +59,31 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
             return false;
         }
         let card = model.card();
+        // Sub-rate ticks ahead for which the network is asked.
         let ahead = match card.timing.interpolation {
             Interpolation::Hold => 0,
-            Interpolation::Linear => divisor,
+            Interpolation::Linear => 1,
         };
-        (job.tick, job.inputs) = (tick, [0.0; MAX_FEATURES]);
-        let (now, sub_tick) = (tick, self.clock.sub_tick());
-        let view = View { desired: preview, measured: &self.measured, references: &self.references, divisor, now, sub_tick };
-        features::evaluate(&card.features, &view, tick.wrapping_add(ahead), divisor, &mut job.inputs);
-        let (inputs, _) = job.inputs.split_at_checked(card.features.len()).unwrap_or_default();
+        let then = tick.wrapping_add(divisor * ahead);
+        let view = View {
+            desired: preview,
+            origin: preview.sample(then),
+            measured: &self.measured,
+            references: &self.references,
+            sub_tick: self.clock.sub_tick().wrapping_add(ahead),
+        };
+        job.tick = tick;
+        let inputs = job.inputs.get_mut(..card.features.len()).unwrap_or_default();
+        evaluate(&card.features, &view, then, divisor, inputs);
         self.features = Features::compare(inputs, &model.envelope(), self.guard.settings());
-        let share = if self.guard.settings().enabled {
-            window::share(&card.features, inputs, &self.changes, self.guard.settings())
-        } else {
-            1.0
-        };
+        let share = if self.guard.settings().enabled { window::share(&card.features, inputs, &self.paces) } else { 1.0 };
         self.ramp.release(tick, share);
         true
     }
 
     /// The measurement of this tick or, if a channel is no finite number, the newest one that was; `None` if there never was one.
     fn sane(&mut self, measured: &[f32; M]) -> Option<[f32; M]> {
-        if finite(measured) {
+        if all_finite(measured) {
             self.good = Some(*measured);
         }
         self.good
@@ -132,13 +134,19 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
     ) -> [f32; R] {
         let desired = preview.sample(tick);
         let mut reference = self.desired_reference(preview, &desired, measured);
-        self.bad = if finite(measured) { 0 } else { self.bad.saturating_add(1) };
-        let (Some(model), Some(measured)) = (self.model, self.sane(measured)) else {
+        let stand_in;
+        let known = if all_finite(measured) {
+            (self.good, self.bad) = (Some(*measured), 0);
+            Some(measured)
+        } else {
+            (stand_in, self.bad) = (self.good, self.bad.saturating_add(1));
+            stand_in.as_ref()
+        };
+        let (Some(model), Some(measured)) = (self.model, known) else {
             self.clock.advance(tick, 1);
             self.correction.fade(&self.bounds, &mut reference);
             return reference;
         };
-        let measured = &measured;
         let card = model.card();
         let divisor = divisor(card);
         self.clock.advance(tick, divisor);
@@ -155,7 +163,7 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
             wanted: self.lanes,
             last: self.acted.then_some(&self.outcome),
             features: core::mem::replace(&mut self.features, Features::Unchanged),
-            finite: finite(&desired),
+            finite: all_finite(&desired),
             bad: self.bad,
             late: self.ramp.late_in_a_row(),
             age: self.age.max(self.standing),
@@ -181,7 +189,10 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
             self.correction.clear(card, &wanted, &mut self.outcome)
         };
         self.feedback.applied(model, &applied);
-        self.acted = acting || self.lanes != Lanes::NONE;
+        // What the guard learns of it begins one reference tick after a sub-rate tick: where it sums up as often as the network
+        // is evaluated, no tick pays for both.
+        let turn = self.acted || self.clock.phase() == 1 % divisor;
+        self.acted = turn && (acting || self.lanes != Lanes::NONE);
         if self.acted {
             (self.outcome.active, self.outcome.asked) = (active, wanted.feedback);
             self.outcome.network = self.network_weight * self.ramp.share();
@@ -209,19 +220,28 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
     ) -> [f32; R] {
         if !preview.is_empty() {
             let reference = base(&self.base, desired);
-            // Behind the trajectory's end velocities vanish: that is how it is held.
-            self.held = Some(core::array::from_fn(|r| {
-                let rest = preview.rule(self.base.get(r).copied().unwrap_or(0)) == EndRule::Zero;
-                if rest { 0.0 } else { reference.get(r).copied().unwrap_or(0.0) }
-            }));
+            self.held = Some(reference);
             return reference;
         }
         let origin = &self.origin;
-        *self.held.get_or_insert_with(|| {
+        let mut held = *self.held.get_or_insert_with(|| {
             let here = |channel: u8| measured.get(usize::from(channel)).copied().map_or(0.0, finite_or_zero);
             core::array::from_fn(|r| origin.get(r).copied().flatten().map_or(0.0, here))
-        })
+        });
+        // Behind the trajectory's end velocities vanish: that is how it is held.
+        for (value, channel) in held.iter_mut().zip(&self.base) {
+            if preview.rule(*channel) == EndRule::Zero {
+                *value = 0.0;
+            }
+        }
+        held
     }
+}
+
+/// The features of a sub-rate tick. Apart from the rest of the tick, which would leave these loops no registers.
+#[inline(never)]
+fn evaluate(features: &[Feature], signals: &impl Signals, tick: i32, divisor: i32, inputs: &mut [f32]) {
+    features::evaluate(features, signals, tick, divisor, inputs);
 }
 
 /// The reference without any correction, of these desired channels.

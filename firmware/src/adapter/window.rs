@@ -21,8 +21,14 @@ fn along(feature: &Feature) -> bool {
     feature.source == Source::Desired && feature.relative != Relative::Nothing
 }
 
-/// Largest change in a sub-rate tick of each desired channel in training.
-pub(super) fn changes<const D: usize>(card: &Card<'_>, (low, high): &(Floats<'_>, Floats<'_>)) -> [f32; D] {
+/// For each desired channel the reciprocal of what it may move by in a sub-rate tick: what training moved by, the guard's margin
+/// beyond it, and its floor.
+#[inline(never)]
+pub(super) fn paces<const D: usize>(
+    card: &Card<'_>,
+    (low, high): &(Floats<'_>, Floats<'_>),
+    settings: &GuardSettings,
+) -> [f32; D] {
     let mut changes = [0.0f32; D];
     for (feature, (low, high)) in card.features.iter().zip(low.iter().zip(high.iter())) {
         let Some(change) = changes.get_mut(usize::from(feature.channel)).filter(|_| along(feature)) else { continue };
@@ -31,49 +37,62 @@ pub(super) fn changes<const D: usize>(card: &Card<'_>, (low, high): &(Floats<'_>
             *change = change.max(abs(low).max(abs(high)) / offset);
         }
     }
-    changes
+    changes.map(|change| pace(change, settings))
 }
 
-/// A window as it is read, offset by offset.
-#[derive(Clone, Copy)]
-struct Place<'f> {
-    feature: &'f Feature,
-    offset: i32,
-    value: f32,
+/// The reciprocal of what a channel may move by that moved by `change` in training.
+fn pace(change: f32, settings: &GuardSettings) -> f32 {
+    let allowed = (1.0 + settings.window_margin) * change + settings.envelope_floor / CLOSE;
+    // Written so that NaN allows nothing.
+    if allowed > 1.0 / f32::MAX { 1.0 / allowed } else { f32::MAX }
 }
 
-/// Share of the network's correction that features leave it, 0..=1: all of it up to the guard's margin beyond what training saw,
-/// nothing from half as much again on. What counts is how far the window moves in a sub-rate tick.
-pub(super) fn share<const D: usize>(features: &[Feature], values: &[f32], changes: &[f32; D], settings: &GuardSettings) -> f32 {
-    let mut excess = 0.0f32;
-    let mut last: Option<Place<'_>> = None;
-    for (feature, value) in features.iter().zip(values) {
-        if !along(feature) {
-            last = None;
+/// Share of the network's correction that features leave it, 0..=1: all of it up to what `paces` allow, nothing from half as much
+/// again on. What counts is how far the window moves in a sub-rate tick.
+#[inline(never)]
+pub(super) fn share<const D: usize>(features: &[Feature], values: &[f32], paces: &[f32; D]) -> f32 {
+    // Bits of the largest excess. Those of numbers without a sign are in the order of the numbers, and NaN is the largest.
+    let mut excess = 0u32;
+    let mut rest = features.iter().zip(values);
+    let mut next = rest.next();
+    while let Some((first, value)) = next {
+        if !along(first) {
+            next = rest.next();
             continue;
         }
-        let change = changes.get(usize::from(feature.channel)).copied().unwrap_or(0.0);
-        let allowed = (1.0 + settings.window_margin) * change + settings.envelope_floor / CLOSE;
-        let offset = i32::from(feature.offset);
-        let mut go = |before: Option<Place<'_>>, offset: i32, value: f32| {
-            let rate = before.map(|before| (value - before.value) / (offset - before.offset) as f32);
-            let moved = abs(rate.unwrap_or(0.0));
-            // Written so that NaN is an excess.
-            let found = if moved <= f32::MAX { moved / allowed } else { f32::MAX };
-            excess = if found > excess { found } else { excess };
-            Place { feature, offset, value }
-        };
-        let mut before = last.filter(|last| {
-            last.feature.channel == feature.channel && last.feature.relative == feature.relative && last.offset < offset
-        });
-        // A window that is relative to its own channel leaves out the present, which is zero.
-        let present = feature.relative == Relative::Desired(feature.channel) && offset > 0;
-        if present && before.is_none_or(|before| before.offset < 0) {
-            before = Some(go(before, 0, 0.0));
+        // A window: what follows of the same channel and origin, offset by offset.
+        next = None;
+        let own = first.relative == Relative::Desired(first.channel);
+        let mut last = (i32::from(first.offset), *value);
+        let mut moved = if own && first.offset > 0 { across((0, 0.0), last, own) } else { 0 };
+        for (feature, value) in rest.by_ref() {
+            let same = feature.channel == first.channel && feature.source == first.source && feature.relative == first.relative;
+            let steps = i32::from(feature.offset) - last.0;
+            if !same || steps <= 0 {
+                next = Some((feature, value));
+                break;
+            }
+            let place = (i32::from(feature.offset), *value);
+            // In a window no sub-rate tick is left out but the present.
+            let found = if steps == 1 { abs(*value - last.1).to_bits() } else { across(last, place, own) };
+            moved = moved.max(found);
+            last = place;
         }
-        last = Some(go(before, offset, *value));
+        let pace = paces.get(usize::from(first.channel)).copied().unwrap_or(f32::MAX);
+        excess = excess.max(abs(f32::from_bits(moved) * pace).to_bits());
     }
+    // NaN is an excess.
+    let excess = if excess <= f32::MAX.to_bits() { f32::from_bits(excess) } else { f32::MAX };
     clamp((NOTHING_LEFT - excess) / (NOTHING_LEFT - 1.0), 0.0, 1.0)
+}
+
+/// Bits of how far a window moves in a sub-rate tick from one of its places to the next one, between which some are left out. A
+/// window that is relative to its `own` channel leaves out the present, which is zero.
+#[inline(never)]
+fn across(from: (i32, f32), to: (i32, f32), own: bool) -> u32 {
+    let rate = |from: (i32, f32), to: (i32, f32)| abs((to.1 - from.1) / (to.0 - from.0) as f32).to_bits();
+    let present = (0, 0.0);
+    if own && from.0 < 0 && to.0 > 0 { rate(from, present).max(rate(present, to)) } else { rate(from, to) }
 }
 
 #[cfg(test)]
@@ -81,13 +100,11 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const CHANGES: [f32; 1] = [0.1];
-
     fn found(value: impl Fn(f32) -> f32) -> f32 {
         let features: heapless::Vec<Feature, 32> = crate::features::window(&[0], -4..=8).collect();
         let values: heapless::Vec<f32, 32> =
             features.iter().map(|feature| value(f32::from(feature.offset)) - value(0.0)).collect();
-        share(&features, &values, &CHANGES, &GuardSettings::default())
+        share(&features, &values, &[pace(0.1, &GuardSettings::default())])
     }
 
     #[test]
@@ -110,7 +127,7 @@ mod tests {
         #[test]
         fn it_is_a_share_whatever_comes_in(values in prop::collection::vec(any::<f32>(), 12), change in any::<f32>()) {
             let features: heapless::Vec<Feature, 32> = crate::features::window(&[0], -4..=8).collect();
-            let share = share(&features, &values, &[change], &GuardSettings::default());
+            let share = share(&features, &values, &[pace(change, &GuardSettings::default())]);
             prop_assert!((0.0..=1.0).contains(&share), "{share}");
         }
     }

@@ -81,7 +81,7 @@ mod tests {
             if cut {
                 bytes.truncate(keep.index(bytes.len()));
             }
-            let mut found = Card::EMPTY;
+            let mut found = Card::empty();
             let rest = card(&bytes, &mut found);
             match postcard::take_from_bytes::<Card<'_>>(&bytes) {
                 // By text: a number that is none is not equal to itself.

@@ -192,18 +192,17 @@ pub(super) fn network_probes<'a>(
     if count == 0 {
         return Err(Refusal::NoProbes);
     }
-    let (mut x, mut y) = ([0.0; MAX_FEATURES], [0.0; MAX_OUTPUTS]);
+    let mut y = [0.0; MAX_OUTPUTS];
     for probe in 0..count {
-        for (i, value) in x.iter_mut().enumerate().take(inputs) {
-            *value = probe_inputs.get(probe * inputs + i);
-        }
-        network.evaluate(&x, &mut y, scratch);
+        // Read where they are: an array of them would lie on the stack below the model that is checked.
+        let (x, _) = probe_inputs.split_at(probe * inputs).1.split_at(inputs);
+        network.evaluate_each(x.iter(), &mut y, scratch);
         let same =
             (0..outputs).all(|o| y.get(o).is_some_and(|y| y.to_bits() == probe_outputs.get(probe * outputs + o).to_bits()));
         if !same {
             return Err(Refusal::Probe { index: probe as u8 });
         }
-        bounds.check(&x, &y, envelope)?;
+        bounds.check(x, &y, envelope)?;
     }
     Ok(())
 }

@@ -149,25 +149,40 @@ impl<'a> Network<'a> {
     /// A scratch of fewer words than [`Network::scratch_words`], or fewer inputs than features, leave `outputs` as they are.
     #[inline]
     pub fn evaluate<const WORDS: usize>(&self, inputs: &[f32], outputs: &mut [f32], scratch: &mut Scratch<WORDS>) {
-        self.run(inputs, outputs, scratch.words());
+        if let Some(inputs) = inputs.get(..self.mean.len()) {
+            self.evaluate_each(inputs.iter().copied(), outputs, scratch);
+        }
     }
 
-    #[inline(never)]
-    fn run(&self, inputs: &[f32], outputs: &mut [f32], scratch: &mut [u32]) {
-        let (Some((front, rest)), Some(inputs)) = (scratch.split_at_mut_checked(self.half), inputs.get(..self.mean.len())) else {
-            return;
-        };
+    /// [`Network::evaluate`] for as many inputs as there are features, which need not lie in a row.
+    #[inline]
+    pub(crate) fn evaluate_each<const WORDS: usize>(
+        &self,
+        inputs: impl Iterator<Item = f32>,
+        outputs: &mut [f32],
+        scratch: &mut Scratch<WORDS>,
+    ) {
+        let Some((front, rest)) = scratch.words().split_at_mut_checked(self.half) else { return };
         let Some(back) = rest.get_mut(..self.half) else { return };
+        let normalised = match &self.layers {
+            Layers::Float(_) => &mut *front,
+            Layers::Integer { .. } => &mut *back,
+        };
+        self.normalise(inputs, normalised);
+        self.run(outputs, front, back);
+    }
+
+    /// Layers and skip, from the normalised inputs on.
+    #[inline(never)]
+    fn run(&self, outputs: &mut [f32], front: &mut [u32], back: &mut [u32]) {
         match &self.layers {
             Layers::Float(layers) => {
-                self.normalise(inputs, front);
                 self.skip(front, outputs);
                 let values = float::outputs(layers, front, back);
                 self.denormalise(values.iter().map(|value| f32::from_bits(*value)), outputs);
             }
             Layers::Integer { code, layers } => {
-                let encoding = integer::Encoding { mean: self.mean, reciprocal_scale: self.reciprocal_scale, code: *code };
-                integer::encode(&encoding, inputs, layers, back, front);
+                integer::encode(*code, self.mean.len(), layers, back, front);
                 self.skip(back, outputs);
                 let sums = integer::sums(layers, front, back).iter().zip(integer::scales(layers));
                 self.denormalise(sums.map(|(sum, scale)| *sum as i32 as f32 * f32::from_le_bytes(*scale)), outputs);
@@ -177,14 +192,17 @@ impl<'a> Network<'a> {
 
     /// Normalises the inputs into `words`, padded with zeros.
     #[inline(always)]
-    fn normalise(&self, inputs: &[f32], words: &mut [u32]) {
+    fn normalise(&self, inputs: impl Iterator<Item = f32>, words: &mut [u32]) {
         let normalisation = self.mean.iter().zip(self.reciprocal_scale.iter());
         for ((word, input), (mean, reciprocal)) in words.iter_mut().zip(inputs).zip(normalisation) {
-            *word = ((*input - mean) * reciprocal).to_bits();
+            *word = ((input - mean) * reciprocal).to_bits();
         }
-        // One is enough: float layers have an even number of inputs.
-        if let Some(word) = words.get_mut(inputs.len()) {
-            *word = 0;
+        let mut padded = self.mean.len();
+        while !padded.is_multiple_of(INPUT_PADDING) {
+            if let Some(word) = words.get_mut(padded) {
+                *word = 0;
+            }
+            padded += 1;
         }
     }
 
@@ -202,12 +220,26 @@ impl<'a> Network<'a> {
     #[inline(always)]
     fn denormalise(&self, values: impl Iterator<Item = f32>, outputs: &mut [f32]) {
         let denormalisation = self.output_scale.iter().zip(self.output_mean.iter());
+        let mut sum = 0.0;
         for ((output, value), (scale, mean)) in outputs.iter_mut().zip(values).zip(denormalisation) {
             let skip = if self.skip.is_some() { *output } else { 0.0 };
-            let value = (skip + value) * scale + mean;
-            // Neither NaN nor an infinity, nor a number that would make one of the next: none of it was meant, so no correction.
-            *output = if abs(value) <= ranges::MAGNITUDE { value } else { 0.0 };
+            *output = (skip + value) * scale + mean;
+            sum += abs(*output);
         }
+        // One comparison for all: a sum of magnitudes that is small has no large one, and none that is no number.
+        let small = sum <= ranges::MAGNITUDE;
+        if !small {
+            leave_out(outputs, self.output_scale.len());
+        }
+    }
+}
+
+/// Neither NaN nor an infinity, nor a number that would make one of the next: none of it was meant, so no correction.
+#[cold]
+#[inline(never)]
+fn leave_out(outputs: &mut [f32], count: usize) {
+    for output in outputs.iter_mut().take(count) {
+        *output = if abs(*output) <= ranges::MAGNITUDE { *output } else { 0.0 };
     }
 }
 

@@ -96,7 +96,7 @@ pub(super) fn examine(
     scratch: &mut Scratch,
     check: impl FnOnce(&Model<'_>) -> Result<(), Refusal>,
 ) -> Result<(), Refusal> {
-    let mut place = Model::EMPTY;
+    let mut place = Model::empty();
     check(Model::load_into(&mut place, file, scratch)?)
 }
 

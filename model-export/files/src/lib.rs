@@ -6,8 +6,9 @@
 //!
 //! | layer | modules | what they hold |
 //! |---|---|---|
-//! | 1 | `text`, `name` | texts that are seen and not obeyed; names that are plain file names |
+//! | 1 | `text` | texts that are seen and not obeyed |
 //! | 1 | `reading`, `interruption` | regular files within a limit; what is removed when a signal ends the program |
+//! | 2 | `name` | names that are plain file names |
 //! | 2 | `place` | what stands where a file shall be written, and whether it is an input |
 //! | 3 | `replacement` | files written whole or not at all, one or a set |
 

@@ -126,7 +126,8 @@ pub fn apart(output: &Path, inputs: impl IntoIterator<Item = impl AsRef<Path>>) 
     }
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
+#[cfg(unix)]
 mod tests {
     use super::*;
 

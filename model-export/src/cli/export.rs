@@ -12,7 +12,7 @@ use impromptu_firmware::model::Model;
 use serde::Serialize;
 
 use super::{
-    Ambiguous,
+    ambiguous::Ambiguous,
     files::{beside, read, refuse_foreign},
     format::Format,
 };

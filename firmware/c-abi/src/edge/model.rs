@@ -44,7 +44,7 @@ pub unsafe extern "C" fn impromptu_model_create(model: *mut ModelMemory, size: u
 #[inline(never)]
 unsafe fn load(made: Made<'_, Model<'static>>, bytes: &'static [u8], before: Option<&'static [u8]>) -> Result<(), Status> {
     // SAFETY: the module's rules.
-    let mut place = unsafe { made.begin(Model::EMPTY) };
+    let mut place = unsafe { made.begin(Model::empty()) };
     let mut scratch = Scratch::new();
     let refusal = match Model::load_into(place.value(), bytes, &mut scratch) {
         Ok(_) => None,

@@ -76,6 +76,8 @@ impl Course {
     }
 
     /// Appends a sample of the desired trajectory, and what was lost before it.
+    // Apart from the other commands, which need none of its stack.
+    #[inline(never)]
     pub(super) fn follow(&mut self, flight: &mut Flight<'_>, now: &Now, timed: &TimedSetpoint) -> Result<(), Reason> {
         if matches!(self.plan, Plan::Brake { .. }) {
             return Err(Reason::Braking);
