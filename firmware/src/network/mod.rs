@@ -149,32 +149,40 @@ impl<'a> Network<'a> {
     /// A scratch of fewer words than [`Network::scratch_words`], or fewer inputs than features, leave `outputs` as they are.
     #[inline]
     pub fn evaluate<const WORDS: usize>(&self, inputs: &[f32], outputs: &mut [f32], scratch: &mut Scratch<WORDS>) {
-        if let Some(inputs) = inputs.get(..self.mean.len()) {
-            self.evaluate_each(inputs.iter().copied(), outputs, scratch);
+        self.run(Some(inputs), outputs, scratch.words());
+    }
+
+    /// [`Network::evaluate`] for as many inputs as there are features, which need not lie in an array.
+    pub(crate) fn evaluate_each(&self, inputs: impl Iterator<Item = f32>, outputs: &mut [f32], scratch: &mut Scratch) {
+        let Some((front, back)) = self.halves(scratch.words()) else { return };
+        self.normalise(inputs, self.normalised(front, back));
+        self.run(None, outputs, scratch.words());
+    }
+
+    /// The scratch's two parts; `None`: it has too few words.
+    #[inline(always)]
+    fn halves<'s>(&self, scratch: &'s mut [u32]) -> Option<(&'s mut [u32], &'s mut [u32])> {
+        let (front, rest) = scratch.split_at_mut_checked(self.half)?;
+        Some((front, rest.get_mut(..self.half)?))
+    }
+
+    /// The part of the scratch in which the normalised inputs are.
+    #[inline(always)]
+    fn normalised<'s>(&self, front: &'s mut [u32], back: &'s mut [u32]) -> &'s mut [u32] {
+        match &self.layers {
+            Layers::Float(_) => front,
+            Layers::Integer { .. } => back,
         }
     }
 
-    /// [`Network::evaluate`] for as many inputs as there are features, which need not lie in a row.
-    #[inline]
-    pub(crate) fn evaluate_each<const WORDS: usize>(
-        &self,
-        inputs: impl Iterator<Item = f32>,
-        outputs: &mut [f32],
-        scratch: &mut Scratch<WORDS>,
-    ) {
-        let Some((front, rest)) = scratch.words().split_at_mut_checked(self.half) else { return };
-        let Some(back) = rest.get_mut(..self.half) else { return };
-        let normalised = match &self.layers {
-            Layers::Float(_) => &mut *front,
-            Layers::Integer { .. } => &mut *back,
-        };
-        self.normalise(inputs, normalised);
-        self.run(outputs, front, back);
-    }
-
-    /// Layers and skip, from the normalised inputs on.
+    /// Evaluates the network; without inputs, those that are in the scratch already, normalised.
     #[inline(never)]
-    fn run(&self, outputs: &mut [f32], front: &mut [u32], back: &mut [u32]) {
+    fn run(&self, inputs: Option<&[f32]>, outputs: &mut [f32], scratch: &mut [u32]) {
+        let Some((front, back)) = self.halves(scratch) else { return };
+        if let Some(inputs) = inputs {
+            let Some(inputs) = inputs.get(..self.mean.len()) else { return };
+            self.normalise(inputs.iter().copied(), self.normalised(front, back));
+        }
         match &self.layers {
             Layers::Float(layers) => {
                 self.skip(front, outputs);
