@@ -32,6 +32,7 @@ use feedback::Feedback;
 pub use inference::{Inference, Job};
 use ramp::Ramp;
 use signals::{History, View, base_channels, measured_channels, same_signals, whole_signals};
+use window::Jumps;
 
 pub use crate::{format::HISTORY, lanes::Lanes};
 
@@ -72,7 +73,12 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
     held: Option<[f32; R]>,
     /// measured channel from which each reference channel starts when there never was one.
     origin: [Option<u8>; R],
-    /// Reference ticks that the model looks ahead,
+    /// Where the desired trajectory jumps,
+    jumps: Jumps,
+    /// and the share of the network's correction that what is desired leaves it, 0..=1.
+    share: f32,
+    /// Reference ticks that the model looks behind and ahead,
+    behind: i32,
     ahead: i32,
     /// and ticks in which the trajectory did not reach as far.
     starved: u32,
@@ -111,6 +117,9 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             bad: 0,
             held: None,
             origin: [None; R],
+            jumps: Jumps::NONE,
+            share: 0.0,
+            behind: 0,
             ahead: 0,
             starved: 0,
             outcome: Outcome::NONE,
@@ -168,7 +177,8 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.model = Some(model);
         self.guard.load(GuardSettings::default(), rate_hz);
         self.bounds.load(caps, rate_hz);
-        self.ahead = model.card().preview_span().1 as i32;
+        let (behind, ahead) = model.card().preview_span();
+        (self.behind, self.ahead) = (behind as i32, ahead as i32);
         self.paces = window::paces(model.card(), &model.envelope(), self.guard.settings());
         self.know(table);
         self.deferred = false;
@@ -216,7 +226,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.measured.clear(0);
         self.references.clear(0);
         self.forget_lanes();
-        self.features = Features::Unchanged;
+        (self.features, self.jumps) = (Features::Unchanged, Jumps::NONE);
         (self.age, self.standing) = (0, 0);
         self.guard.reset();
     }
@@ -276,6 +286,11 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     /// Reference ticks in a second of the model that is flown; 0 without one.
     pub fn rate_hz(&self) -> f32 {
         self.model.map_or(0.0, |model| model.card().timing.reference_rate_hz)
+    }
+
+    /// Tells that what is desired at this tick and later has been replaced ([`Preview::truncate`], [`Preview::clear`]).
+    pub fn replanned(&mut self, from: i32) {
+        self.jumps.forget(from);
     }
 
     /// Correction of each output of the model in the last tick.

@@ -218,6 +218,7 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
     /// fewer had been pushed. What lies before stays: for another trajectory from there on.
     pub fn truncate(&mut self, from: i32) {
         self.preview.truncate(from);
+        self.adapter.replanned(from);
     }
 
     /// Tick of the next sample that is pushed.
@@ -234,6 +235,7 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
     /// measured: for a jump of the trajectory on the way.
     pub fn clear(&mut self, first_tick: i32) {
         self.preview.clear(first_tick);
+        self.adapter.replanned(first_tick);
     }
 
     /// Forgets the trajectory and everything that was measured and corrected, but for the counts and the lanes that are wanted,

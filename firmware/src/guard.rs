@@ -97,6 +97,11 @@ impl Guard {
         Lanes { network: wanted.network && !self.network.tripped(), feedback: wanted.feedback && !self.feedback.tripped() }
     }
 
+    /// Whether the loop swings more than it may after what is desired.
+    pub(crate) fn swinging(&self) -> bool {
+        self.counterfactual.swing().swinging()
+    }
+
     /// Trips since the start.
     pub fn trips(&self) -> Trips {
         self.trips

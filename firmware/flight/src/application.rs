@@ -119,13 +119,13 @@ impl<'m> Application<'m> {
                         Reason::Busy
                     } else {
                         if *storing == Storing::No {
-                            *storing = if message == Command::ModelCommit { Storing::Last } else { Storing::Piece };
+                            *storing = if matches!(message, Command::ModelCommit) { Storing::Last } else { Storing::Piece };
                         }
                         // Made last of all: it is large, and the stack holds it once.
                         return Upload::new(sequence, &message);
                     };
                     (sequence, Outcome::Refused(reason))
-                } else if *storing != Storing::No && message == Command::Arm && order != Order::Late {
+                } else if *storing != Storing::No && matches!(message, Command::Arm) && order != Order::Late {
                     // The core stands still while the flash is erased.
                     (sequence, Outcome::Refused(Reason::Busy))
                 } else {

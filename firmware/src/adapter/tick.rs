@@ -76,8 +76,25 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
         let inputs = job.inputs.get_mut(..card.features.len()).unwrap_or_default();
         evaluate(&card.features, &view, then, divisor, inputs);
         self.features = Features::compare(inputs, &model.envelope(), self.guard.settings());
-        let share = if self.guard.settings().enabled { window::share(&card.features, inputs, &self.paces) } else { 1.0 };
-        self.ramp.release(tick, share);
+        // What is not stored yet has not been seen.
+        let stored = preview.reach(tick).clamp(0, self.ahead);
+        let reach = (tick.wrapping_sub(self.behind), tick.wrapping_add(stored));
+        let share = if !self.guard.settings().enabled {
+            1.0
+        } else if self.jumps.within(reach, &card.features, preview, &self.paces, divisor) {
+            0.0
+        } else {
+            window::share(&card.features, inputs, &self.paces)
+        };
+        // At once down, and up by fade when the loop has come to rest from what took it away.
+        let fade = divisor as f32 / f32::from(card.timing.fade_ticks.max(1));
+        let most = match (self.ramp.current(), self.guard.swinging()) {
+            (false, _) => 1.0,
+            (true, false) => self.share + fade,
+            (true, true) => self.share,
+        };
+        self.share = if share < most { share } else { most };
+        self.ramp.release(tick, self.share);
         true
     }
 

@@ -9,12 +9,83 @@ use crate::{
     format::{Card, Feature, Floats, Relative, Source},
     guard::GuardSettings,
     math::{abs, clamp},
+    preview::Preview,
 };
 
 /// Sub-rate ticks over which a window may move by the guard's floor in addition.
 const CLOSE: f32 = 5.0;
 /// From this many times what is allowed on, nothing of the network's correction is left.
 const NOTHING_LEFT: f32 = 1.5;
+
+/// A channel jumps that moves from one reference tick to the next by this many times what a window may move by in the mean.
+const JUMP: f32 = 3.0;
+
+/// Where the desired trajectory jumps from one reference tick to the next. Between two offsets of a window that is a motion like
+/// others, only a fast one.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Jumps {
+    /// The newest tick at which it does,
+    newest: Option<i32>,
+    /// and the last one that was looked at.
+    seen: Option<i32>,
+}
+
+impl Jumps {
+    /// Nothing seen yet: all zeros.
+    pub(super) const NONE: Self = Self { newest: None, seen: None };
+
+    /// What is desired at this tick and later has been replaced.
+    pub(super) fn forget(&mut self, from: i32) {
+        let before = |tick: &i32| tick.wrapping_sub(from) < 0;
+        self.newest = self.newest.filter(before);
+        self.seen = self.seen.map(|seen| if before(&seen) { seen } else { from.wrapping_sub(1) });
+    }
+
+    /// Whether there is a jump at one of the ticks `first..=last`; `paces` as for [`share`], for sub-rate ticks of `divisor`
+    /// reference ticks.
+    #[inline(never)]
+    pub(super) fn within<const D: usize, const N: usize>(
+        &mut self,
+        (first, last): (i32, i32),
+        features: &[Feature],
+        preview: &Preview<D, N>,
+        paces: &[f32; D],
+        divisor: i32,
+    ) -> bool {
+        let seen = self.seen.filter(|seen| seen.wrapping_sub(first) >= 0 && last.wrapping_sub(*seen) >= 0);
+        let mut tick = seen.unwrap_or(first);
+        while tick != last {
+            let next = tick.wrapping_add(1);
+            if jumps(tick, features, preview, paces, divisor) {
+                self.newest = Some(next);
+            }
+            tick = next;
+        }
+        self.seen = Some(last);
+        self.newest.is_some_and(|newest| newest.wrapping_sub(first) >= 0 && last.wrapping_sub(newest) >= 0)
+    }
+}
+
+/// Whether a channel that features look along jumps behind this tick.
+fn jumps<const D: usize, const N: usize>(
+    tick: i32,
+    features: &[Feature],
+    preview: &Preview<D, N>,
+    paces: &[f32; D],
+    divisor: i32,
+) -> bool {
+    let mut last = None;
+    features.iter().filter(|feature| along(feature)).any(|feature| {
+        if last.replace(feature.channel) == Some(feature.channel) {
+            return false;
+        }
+        let channel = usize::from(feature.channel);
+        let change = preview.channel(tick.wrapping_add(1), channel) - preview.channel(tick, channel);
+        let pace = paces.get(channel).copied().unwrap_or(0.0);
+        // Written so that NaN jumps.
+        !(abs(change) * pace * divisor as f32 <= JUMP)
+    })
+}
 
 /// Features that look along the desired trajectory from an origin.
 fn along(feature: &Feature) -> bool {
@@ -98,6 +169,7 @@ fn across(from: (i32, f32), to: (i32, f32), own: bool) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::format::EndRule;
     use proptest::prelude::*;
 
     fn found(value: impl Fn(f32) -> f32) -> f32 {
@@ -105,6 +177,40 @@ mod tests {
         let values: heapless::Vec<f32, 32> =
             features.iter().map(|feature| value(f32::from(feature.offset)) - value(0.0)).collect();
         share(&features, &values, &[pace(0.1, &GuardSettings::default())])
+    }
+
+    /// Ticks at which a jump is within 20 ticks of a trajectory of 200, read as it is pushed 10 ticks ahead.
+    fn jumping(value: impl Fn(i32) -> f32) -> heapless::Vec<i32, 256> {
+        let features: heapless::Vec<Feature, 32> = crate::features::window(&[0], -4..=8).collect();
+        let (mut preview, mut jumps) = (Preview::<1, 64>::new([EndRule::Hold], 0), Jumps::NONE);
+        let mut found = heapless::Vec::new();
+        for tick in 0..200 {
+            while preview.reach(tick) < 10 {
+                preview.push([value(preview.next_tick())]);
+            }
+            if jumps.within((tick - 10, tick + 10), &features, &preview, &[pace(0.1, &GuardSettings::default())], 2) {
+                found.push(tick).unwrap();
+            }
+        }
+        found
+    }
+
+    #[test]
+    fn a_jump_is_seen_while_it_is_in_the_window_and_a_motion_as_fast_is_none() {
+        // Three times the mean pace of 0.057 a reference tick.
+        let step = |size: f32| jumping(|tick| if tick < 100 { 0.0 } else { size });
+        assert_eq!((step(0.2).first(), step(0.2).last()), (Some(&90), Some(&110)));
+        assert!(step(0.15).is_empty() && jumping(|tick| 0.05 * tick as f32).is_empty());
+        assert_eq!(jumping(|tick| if tick < 100 { 0.0 } else { f32::NAN }).first(), Some(&90));
+    }
+
+    #[test]
+    fn what_was_replaced_is_looked_at_again() {
+        let mut jumps = Jumps { newest: Some(50), seen: Some(80) };
+        jumps.forget(60);
+        assert_eq!((jumps.newest, jumps.seen), (Some(50), Some(59)));
+        jumps.forget(40);
+        assert_eq!((jumps.newest, jumps.seen), (None, Some(39)));
     }
 
     #[test]

@@ -18,38 +18,12 @@ use crate::{
 /// Recent share of the network lane from which on, and at which, it is relied on.
 const RELIED: [f32; 2] = [0.7, 0.9];
 
-/// Numbers of one axis, or energies of all.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Parts {
-    /// Error.
-    pub(super) with: f32,
-    /// Error without the feedback lane.
-    pub(super) without: f32,
-    /// What the loop makes of the feedback lane's part of the correction.
-    pub(super) response: f32,
-    /// Error that the nominal response to the desired trajectory alone leads to.
-    pub(super) nominal: f32,
-}
+/// Numbers of one axis, or energies of all: of the error, of the error without the feedback lane, of what the loop makes of that
+/// lane's part of the correction, and of the error that the nominal response to the desired trajectory alone leads to.
+pub(super) type Parts = [f32; 4];
 
-impl Parts {
-    /// All zeros.
-    const NONE: Self = Self { with: 0.0, without: 0.0, response: 0.0, nominal: 0.0 };
-
-    /// Applies `change` to each number and that of others.
-    fn each(&self, other: &Self, change: impl Fn(f32, f32) -> f32) -> Self {
-        Self {
-            with: change(self.with, other.with),
-            without: change(self.without, other.without),
-            response: change(self.response, other.response),
-            nominal: change(self.nominal, other.nominal),
-        }
-    }
-
-    /// An exponentially weighted mean of this gain goes on to `now`.
-    fn towards(&self, now: &Self, gain: f32) -> Self {
-        self.each(now, |mean, now| finite_or_zero(mean + (now - mean) * gain))
-    }
-}
+/// Place of the last one.
+const NOMINAL: usize = 3;
 
 /// Recent swinging parts.
 #[derive(Clone, Debug)]
@@ -71,7 +45,7 @@ pub(super) struct Swing {
 impl Swing {
     /// Nothing seen yet: all zeros.
     pub(super) const NONE: Self =
-        Self { means: [Parts::NONE; MAX_AXES], energies: Parts::NONE, reliance: 0.0, share: 0.0, swinging: false, astray: false };
+        Self { means: [[0.0; 4]; MAX_AXES], energies: [0.0; 4], reliance: 0.0, share: 0.0, swinging: false, astray: false };
 
     /// Share of the feedback lane that may act, 0..=1.
     pub(super) fn share(&self) -> f32 {
@@ -98,27 +72,28 @@ impl Swing {
     }
 
     /// A monitor tick of this length, s.
+    #[inline(never)]
     pub(super) fn observe(&mut self, axes: &[Parts; MAX_AXES], validated_rms: f32, settings: &GuardSettings, seconds: f32) {
         let slow = ewma_gain(seconds / settings.swing_s);
-        let mut now = Parts::NONE;
-        for (mean, parts) in self.means.iter_mut().zip(axes) {
-            *mean = mean.towards(parts, slow);
-            let swings = parts.each(mean, |value, mean| (value - mean) * (value - mean));
-            now = now.each(&swings, |sum, square| sum + square);
-        }
         let recent = ewma_gain(seconds / settings.astray_s);
-        let nominal = self.energies.nominal;
-        self.energies = self.energies.towards(&now, recent);
-        // Slower down than up: the loop may be later than nominal.
-        if now.nominal < nominal {
-            self.energies.nominal = finite_or_zero(nominal + (now.nominal - nominal) * 0.5 * recent);
+        for (part, energy) in self.energies.iter_mut().enumerate() {
+            let mut now = 0.0;
+            for (mean, parts) in self.means.iter_mut().zip(axes) {
+                if let (Some(mean), Some(value)) = (mean.get_mut(part), parts.get(part)) {
+                    *mean = finite_or_zero(*mean + (value - *mean) * slow);
+                    now += (value - *mean) * (value - *mean);
+                }
+            }
+            // Slower down than up: the loop may be later than nominal.
+            let gain = if part == NOMINAL && now < *energy { 0.5 * recent } else { recent };
+            *energy = finite_or_zero(*energy + (now - *energy) * gain);
         }
         self.judge(validated_rms, settings, seconds);
     }
 
     fn judge(&mut self, validated_rms: f32, settings: &GuardSettings, seconds: f32) {
         let square = |value: f32| value * value;
-        let Parts { with, without, response, nominal } = self.energies;
+        let [with, without, response, nominal] = self.energies;
         let relied = clamp((self.reliance - RELIED[0]) / (RELIED[1] - RELIED[0]), 0.0, 1.0);
         let factor = settings.astray_factor + (settings.astray_share - settings.astray_factor) * relied;
         let allowed = square(factor) * nominal + square(settings.astray_floor * validated_rms);
@@ -146,7 +121,7 @@ mod tests {
         let (mut swing, settings) = (Swing::NONE, GuardSettings::default());
         for tick in 0..200 {
             swing.rely(network, &settings, TICK);
-            let mut axes = [Parts::NONE; MAX_AXES];
+            let mut axes = [[0.0; 4]; MAX_AXES];
             axes[0] = parts(tick as f32 * TICK);
             swing.observe(&axes, RMS, &settings, TICK);
         }
@@ -157,7 +132,7 @@ mod tests {
     fn swings(amplitude: f32, left: f32) -> impl Fn(f32) -> Parts {
         move |t| {
             let with = amplitude * libm::sinf(10.7 * t);
-            Parts { with, without: with / left, response: with - with / left, nominal: 0.0 }
+            [with, with / left, with - with / left, 0.0]
         }
     }
 
@@ -168,7 +143,7 @@ mod tests {
             after(
                 move |t| {
                     let with = amplitude * libm::sinf(10.7 * t);
-                    Parts { with, without: 1.1 * with, response: amplitude * libm::cosf(10.7 * t), nominal: 0.0 }
+                    [with, 1.1 * with, amplitude * libm::cosf(10.7 * t), 0.0]
                 },
                 1.0,
             )
@@ -190,7 +165,7 @@ mod tests {
 
     #[test]
     fn what_is_slow_is_no_swing() {
-        let payload = |t: f32| Parts { with: 0.1 * t.min(1.0), without: 0.1 * t.min(1.0), response: 0.05, nominal: 0.0 };
+        let payload = |t: f32| [0.1 * t.min(1.0), 0.1 * t.min(1.0), 0.05, 0.0];
         let swing = after(payload, 1.0);
         assert!(!swing.astray() && !swing.swinging() && swing.share() == 1.0, "{swing:?}");
     }
@@ -199,7 +174,7 @@ mod tests {
     fn what_the_desired_trajectory_leads_to_is_allowed_and_less_of_it_where_the_network_acts() {
         let follows = |t: f32| {
             let with = 0.05 * libm::sinf(10.7 * t);
-            Parts { with, without: with, response: with, nominal: 1.5 * with }
+            [with, with, with, 1.5 * with]
         };
         assert!(!after(follows, 0.0).astray());
         assert!(after(follows, 1.0).astray());
@@ -211,7 +186,7 @@ mod tests {
             let (mut swing, settings) = (Swing::NONE, GuardSettings::default());
             for [with, without, response, nominal] in values {
                 swing.rely(network, &settings, TICK);
-                swing.observe(&[Parts { with, without, response, nominal }; MAX_AXES], rms, &settings, TICK);
+                swing.observe(&[[with, without, response, nominal]; MAX_AXES], rms, &settings, TICK);
                 prop_assert!((0.0..=1.0).contains(&swing.share()), "{}", swing.share());
             }
         }

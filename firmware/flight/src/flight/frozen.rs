@@ -42,20 +42,20 @@ struct Axis {
 impl Axis {
     const NONE: Self = Self { position: 0.0, seconds: 0.0, way: 0.0, desired: 0.0, asked: 0.0 };
 
-    fn observe(&mut self, position: f32, velocity: f32, desired: f32, dt: f32) {
+    /// A tick. Returns for how long the position has stood still, s, if it must have changed since; else 0.
+    // Once in flash, not once for each axis.
+    #[inline(never)]
+    fn observe(&mut self, position: f32, velocity: f32, desired: f32, dt: f32) -> f32 {
         if position != self.position {
             *self = Self { position, ..Self::NONE };
-            return;
+            return 0.0;
         }
         self.seconds += dt;
         self.way += velocity * dt;
         self.desired += desired * dt;
         self.asked += if self.desired.abs() >= DESIRED_WAY { dt } else { 0.0 };
-    }
-
-    fn frozen(&self) -> bool {
         let moves = self.way.abs() >= WAY.max(SPEED * self.seconds);
-        self.seconds >= SHORTEST && (moves || self.asked >= RESPONSE)
+        if self.seconds >= SHORTEST && (moves || self.asked >= RESPONSE) { self.seconds } else { 0.0 }
     }
 }
 
@@ -74,6 +74,7 @@ impl Frozen {
     pub(super) const EMPTY: Self = Self { axes: [Axis::NONE; 3], velocity: Vector3::new(0.0, 0.0, 0.0), seconds: 0.0 };
 
     /// A reference tick: tells the adapter what a state says, where this is desired.
+    #[inline(never)]
     pub(super) fn tell(&mut self, adapter: &mut QuadrotorAdapter<'_>, state: &State, desired: &[f32; DESIRED]) {
         let [_, _, _, vx, vy, vz, ..] = *desired;
         let rate_hz = adapter.rate_hz();
@@ -84,15 +85,14 @@ impl Frozen {
     /// A reference tick of `dt` seconds with the measured position and velocity and the desired velocity. Returns how long the
     /// position has stood still, s, if it must have changed since; else 0.
     fn observe(&mut self, position: &Vector3<f32>, velocity: &Vector3<f32>, desired: &Vector3<f32>, dt: f32) -> f32 {
-        let before = self.seconds;
+        let (mut longest, mut stands) = (0.0f32, *velocity == self.velocity);
         for (((axis, position), velocity), desired) in self.axes.iter_mut().zip(position).zip(velocity).zip(desired) {
-            axis.observe(*position, *velocity, *desired, dt);
+            longest = longest.max(axis.observe(*position, *velocity, *desired, dt));
+            stands &= axis.seconds > 0.0;
         }
-        let stands = *velocity == self.velocity && self.axes.iter().all(|axis| axis.seconds > 0.0);
-        self.seconds = if stands { before + dt } else { 0.0 };
+        self.seconds = if stands { self.seconds + dt } else { 0.0 };
         self.velocity = *velocity;
         let whole = self.seconds >= SHORTEST && velocity.iter().any(|speed| speed.abs() >= REST);
-        let longest = self.axes.iter().filter(|axis| axis.frozen()).fold(0.0f32, |most, axis| most.max(axis.seconds));
         if whole { longest.max(self.seconds) } else { longest }
     }
 }
