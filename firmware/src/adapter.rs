@@ -179,6 +179,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.bounds.load(caps, rate_hz);
         let (behind, ahead) = model.card().preview_span();
         (self.behind, self.ahead) = (behind as i32, ahead as i32);
+        self.jumps = Jumps::of(&model.card().features);
         self.paces = window::paces(model.card(), &model.envelope(), self.guard.settings());
         self.know(table);
         self.deferred = false;
@@ -226,7 +227,8 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.measured.clear(0);
         self.references.clear(0);
         self.forget_lanes();
-        (self.features, self.jumps) = (Features::Unchanged, Jumps::NONE);
+        self.features = Features::Unchanged;
+        self.jumps.clear();
         (self.age, self.standing) = (0, 0);
         self.guard.reset();
     }

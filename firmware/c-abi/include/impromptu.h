@@ -49,12 +49,12 @@
 
 #if defined(IMPROMPTU_POINTER_64)
 // Words of 8 bytes of an impromptu_adapter.
-#define IMPROMPTU_ADAPTER_WORDS 2560
+#define IMPROMPTU_ADAPTER_WORDS 2752
 #endif
 
 #if defined(IMPROMPTU_POINTER_32)
 // Words of 8 bytes of an impromptu_adapter.
-#define IMPROMPTU_ADAPTER_WORDS 2528
+#define IMPROMPTU_ADAPTER_WORDS 2720
 #endif
 
 #if defined(IMPROMPTU_POINTER_64)
@@ -363,16 +363,13 @@ extern "C" {
 // A status in words, with what to do; for any number.
 const char *impromptu_status_text(int32_t status);
 
-// Checks a model file of `length` bytes and creates the model in `model`, which has `size` bytes (sizeof *model). A model that was
-// there before lives on if the file is refused; nothing that was created from it may be in use during the call.
+// Checks a model file of `length` bytes and creates the model in `model`, which has `size` bytes (sizeof *model). A model that
+// was there before lives on if the file is refused; nothing that was created from it may be in use during the call.
 //
 // The bytes stay where they are, in flash for instance: they must live and keep unchanged as long as the model. They should
 // start at a multiple of 16 bytes; elsewhere they are read by slower kernels, with the same results. Needs up to 4 KB of stack
 // on a microcontroller; what is not said to need more, 2 KB.
-impromptu_status impromptu_model_create(struct impromptu_model *model,
-                                        size_t size,
-                                        const uint8_t *bytes,
-                                        size_t length);
+impromptu_status impromptu_model_create(struct impromptu_model *model, size_t size, const uint8_t *bytes, size_t length);
 
 // What a model says of itself.
 impromptu_status impromptu_model_describe(const struct impromptu_model *model, struct impromptu_description *description);

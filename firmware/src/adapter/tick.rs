@@ -77,11 +77,11 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
         evaluate(&card.features, &view, then, divisor, inputs);
         self.features = Features::compare(inputs, &model.envelope(), self.guard.settings());
         // What is not stored yet has not been seen.
-        let stored = preview.reach(tick).clamp(0, self.ahead);
+        let stored = preview.reach(tick).min(self.ahead).max(0);
         let reach = (tick.wrapping_sub(self.behind), tick.wrapping_add(stored));
         let share = if !self.guard.settings().enabled {
             1.0
-        } else if self.jumps.within(reach, &card.features, preview, &self.paces, divisor) {
+        } else if self.jumps.within(reach, preview, &self.paces, divisor) {
             0.0
         } else {
             window::share(&card.features, inputs, &self.paces)

@@ -20,11 +20,17 @@ const NOTHING_LEFT: f32 = 1.5;
 /// A channel jumps that moves from one reference tick to the next by this many times what a window may move by in the mean.
 const JUMP: f32 = 3.0;
 
+/// Ticks that are looked at in a sub-rate tick at most, beside those that are new. A lane that begins has faded in when all of its
+/// window has been seen; after a new plan what is near is seen first.
+const CATCH_UP: i32 = 8;
+
 /// Where the desired trajectory jumps from one reference tick to the next. Between two offsets of a window that is a motion like
 /// others, only a fast one.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Jumps {
-    /// The newest tick at which it does,
+    /// Channels that features look along, a bit for each.
+    channels: u32,
+    /// The newest tick at which one jumps,
     newest: Option<i32>,
     /// and the last one that was looked at.
     seen: Option<i32>,
@@ -32,7 +38,18 @@ pub(super) struct Jumps {
 
 impl Jumps {
     /// Nothing seen yet: all zeros.
-    pub(super) const NONE: Self = Self { newest: None, seen: None };
+    pub(super) const NONE: Self = Self { channels: 0, newest: None, seen: None };
+
+    /// Nothing seen yet of the channels that these features look along.
+    pub(super) fn of(features: &[Feature]) -> Self {
+        let channels = features.iter().filter(|feature| along(feature)).map(|feature| 1u32 << (feature.channel & 31));
+        Self { channels: channels.fold(0, |all, channel| all | channel), ..Self::NONE }
+    }
+
+    /// Nothing seen yet.
+    pub(super) fn clear(&mut self) {
+        (self.newest, self.seen) = (None, None);
+    }
 
     /// What is desired at this tick and later has been replaced.
     pub(super) fn forget(&mut self, from: i32) {
@@ -47,44 +64,30 @@ impl Jumps {
     pub(super) fn within<const D: usize, const N: usize>(
         &mut self,
         (first, last): (i32, i32),
-        features: &[Feature],
         preview: &Preview<D, N>,
         paces: &[f32; D],
         divisor: i32,
     ) -> bool {
         let seen = self.seen.filter(|seen| seen.wrapping_sub(first) >= 0 && last.wrapping_sub(*seen) >= 0);
         let mut tick = seen.unwrap_or(first);
-        while tick != last {
-            let next = tick.wrapping_add(1);
-            if jumps(tick, features, preview, paces, divisor) {
-                self.newest = Some(next);
+        let mut before = preview.sample(tick);
+        for _ in 0..divisor.saturating_add(CATCH_UP) {
+            if tick == last {
+                break;
             }
-            tick = next;
+            tick = tick.wrapping_add(1);
+            let sample = preview.sample(tick);
+            for (channel, ((now, before), pace)) in sample.iter().zip(&before).zip(paces).enumerate() {
+                let moved = abs(now - before) * pace * divisor as f32;
+                if self.channels >> (channel & 31) & 1 == 1 && (moved > JUMP || moved.is_nan()) {
+                    self.newest = Some(tick);
+                }
+            }
+            before = sample;
         }
-        self.seen = Some(last);
+        self.seen = Some(tick);
         self.newest.is_some_and(|newest| newest.wrapping_sub(first) >= 0 && last.wrapping_sub(newest) >= 0)
     }
-}
-
-/// Whether a channel that features look along jumps behind this tick.
-fn jumps<const D: usize, const N: usize>(
-    tick: i32,
-    features: &[Feature],
-    preview: &Preview<D, N>,
-    paces: &[f32; D],
-    divisor: i32,
-) -> bool {
-    let mut last = None;
-    features.iter().filter(|feature| along(feature)).any(|feature| {
-        if last.replace(feature.channel) == Some(feature.channel) {
-            return false;
-        }
-        let channel = usize::from(feature.channel);
-        let change = preview.channel(tick.wrapping_add(1), channel) - preview.channel(tick, channel);
-        let pace = paces.get(channel).copied().unwrap_or(0.0);
-        // Written so that NaN jumps.
-        !(abs(change) * pace * divisor as f32 <= JUMP)
-    })
 }
 
 /// Features that look along the desired trajectory from an origin.
@@ -182,13 +185,13 @@ mod tests {
     /// Ticks at which a jump is within 20 ticks of a trajectory of 200, read as it is pushed 10 ticks ahead.
     fn jumping(value: impl Fn(i32) -> f32) -> heapless::Vec<i32, 256> {
         let features: heapless::Vec<Feature, 32> = crate::features::window(&[0], -4..=8).collect();
-        let (mut preview, mut jumps) = (Preview::<1, 64>::new([EndRule::Hold], 0), Jumps::NONE);
+        let (mut preview, mut jumps) = (Preview::<1, 64>::new([EndRule::Hold], 0), Jumps::of(&features));
         let mut found = heapless::Vec::new();
         for tick in 0..200 {
             while preview.reach(tick) < 10 {
                 preview.push([value(preview.next_tick())]);
             }
-            if jumps.within((tick - 10, tick + 10), &features, &preview, &[pace(0.1, &GuardSettings::default())], 2) {
+            if jumps.within((tick - 10, tick + 10), &preview, &[pace(0.1, &GuardSettings::default())], 2) {
                 found.push(tick).unwrap();
             }
         }
@@ -206,7 +209,7 @@ mod tests {
 
     #[test]
     fn what_was_replaced_is_looked_at_again() {
-        let mut jumps = Jumps { newest: Some(50), seen: Some(80) };
+        let mut jumps = Jumps { channels: 1, newest: Some(50), seen: Some(80) };
         jumps.forget(60);
         assert_eq!((jumps.newest, jumps.seen), (Some(50), Some(59)));
         jumps.forget(40);

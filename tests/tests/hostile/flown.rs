@@ -67,7 +67,7 @@ pub(crate) struct Verdict {
 
 impl Verdict {
     pub(crate) fn worse(&self) -> bool {
-        !self.lost && self.ratio > self.allowed
+        !self.lost && (self.ratio > self.allowed || self.ratio.is_nan())
     }
 }
 
@@ -113,9 +113,8 @@ fn judge(models: &Models, draw: &Draw) -> Verdict {
     let mut verdict = Verdict { allowed: FACTORS[usize::from(draw.delay_ms > 0.0)], ..Verdict::default() };
     for (tick, error) in assisted.iter().enumerate() {
         let later = baseline.get(tick + preview).copied().unwrap_or(0.0);
-        // Written so that NaN is worse.
         let ratio = (error - MORE) / baseline[tick].max(later).max(1e-9);
-        if !(ratio <= verdict.ratio) {
+        if ratio > verdict.ratio || ratio.is_nan() {
             (verdict.ratio, verdict.at) = (ratio, tick as f64 / rate_hz);
         }
     }
