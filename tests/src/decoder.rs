@@ -5,7 +5,7 @@
 
 use impromptu_firmware::{
     Cap, Caps,
-    adapter::{Adapter, Lanes},
+    adapter::{Adapter, Job, Lanes},
     feedback::{self, AxisState, Lane},
     model::{Blob, Card, MAX_FEATURES, MAX_OUTPUTS, Model, Probes, Section, file, ranges},
     network::{Network, Scratch},
@@ -32,10 +32,10 @@ fn load(bytes: &[u8]) -> bool {
     let Ok(model) = Model::from_bytes(bytes) else { return false };
     let _ = model.card().preview_span();
     if let Some(network) = model.network() {
-        let (mut outputs, mut scratch) = ([0.0; MAX_OUTPUTS], Scratch::new());
+        let mut scratch = Scratch::new();
         let mixed: [f32; MAX_FEATURES] = core::array::from_fn(|i| EXTREMES[i % EXTREMES.len()]);
         for inputs in EXTREMES.map(|input| [input; MAX_FEATURES]).into_iter().chain([mixed]) {
-            network.evaluate(&inputs, &mut outputs, &mut scratch);
+            let outputs = Job { tick: 0, inputs }.run(network, &mut scratch).outputs;
             assert!(outputs.iter().all(|output| output.abs() <= ranges::MAGNITUDE), "{outputs:?}");
         }
     }
@@ -107,6 +107,8 @@ fn with_probes(bytes: &[u8]) -> Option<Vec<u8>> {
         let network = Network::new(layout, &Blob::new(&blob), card.features.len(), card.outputs.len()).ok()?;
         let (inputs, mut outputs) = ([0.25; MAX_FEATURES], [0.0; MAX_OUTPUTS]);
         network.evaluate(&inputs, &mut outputs, &mut Scratch::new());
+        // As the probes are read.
+        let outputs = outputs.map(|output: f32| if output.abs() <= ranges::MAGNITUDE { output } else { 0.0 });
         let probe = inputs.iter().take(card.features.len()).chain(outputs.iter().take(card.outputs.len()));
         numbers.extend(probe.flat_map(|number| number.to_le_bytes()));
     }

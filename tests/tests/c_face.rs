@@ -159,6 +159,10 @@ fn script(file: &[u8]) -> (Vec<u8>, Vec<u8>) {
                     answers.extend(
                         [adapter.saturations(), adapter.late(), preview.next_tick() as u32].map(u32::to_le_bytes).as_flattened(),
                     );
+                    let reach = preview.reach(reference_tick);
+                    answers.extend([adapter.starved(), reach as u32].map(u32::to_le_bytes).as_flattened());
+                    let trips = adapter.trips();
+                    answers.extend([trips.network, trips.feedback].as_flattened().iter().flat_map(|count| count.to_le_bytes()));
                 }
                 tick += 1;
             }

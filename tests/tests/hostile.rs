@@ -1,9 +1,9 @@
-//! Flights that a clumsy or a hostile user would ask for: whatever is desired, whatever the vehicle is and whatever is measured, both
-//! lanes are no worse than the baseline on the same flight, but for a stated, small amount.
+//! Flights that a clumsy or a hostile user would ask for: whatever is desired, whatever the vehicle is and whatever is measured,
+//! both lanes are no worse than the baseline on the same flight, but for a stated, small amount.
 //!
-//! Every draw has a number; the same number is the same flight. Both fly it with the same vehicle, air, noise and faults. Over any
-//! four seconds the RMS error with the add-on may be 1.1 times the baseline's, 1.5 times where delay was added, and 1 cm more.
-//! The baseline's is that over the same four seconds or over those that begin a preview later, whichever is larger: a preview
+//! Every draw has a number; the same number is the same flight. Both fly it with the same vehicle, air, noise and faults. Over
+//! any four seconds the RMS error with the add-on may be 1.1 times the baseline's, 1.5 times where delay was added, and 1 cm
+//! more. The baseline's is that over the same four seconds or over those that begin a preview later, whichever is larger: a preview
 //! moves before a step. Where the baseline itself is lost, nothing is asked.
 
 mod draw;

@@ -356,7 +356,7 @@ fn adapted(
 ) -> (Reference, bool) {
     let measured = quadrotor::measured(state);
     let (adapter, preview) = add_on.parts();
-    frozen.tell(adapter, state, &preview.sample(tick));
+    adapter.set_standing(frozen.ticks(state, &preview.sample(tick), adapter.rate_hz()));
     let released = adapter.begin_into(tick, preview, &measured, job);
     let reference = adapter.finish_through(tick, preview, &measured, path);
     let yaw = preview.channel(tick, DESIRED - 1);

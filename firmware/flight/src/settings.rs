@@ -307,8 +307,8 @@ pub(crate) mod tests {
 
         #[test]
         fn vehicles_of_any_size_are_taken(scale in 0.33f32..30.0, lift in 1.2f32..8.0) {
-            // From a gram on. Mass with the volume, thrust with mass, inertia with mass and area, frequencies with 1 over the root of
-            // the size.
+            // From a gram on. Mass with the volume, thrust with mass, inertia with mass and area, frequencies with 1 over the
+            // root of the size.
             let mass = 0.03 * scale.powi(3);
             let speed = 2500.0 / scale.sqrt();
             let thrust = lift * mass * 9.81 / 4.0 / speed.powi(2);

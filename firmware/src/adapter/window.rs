@@ -20,8 +20,8 @@ const NOTHING_LEFT: f32 = 1.5;
 /// A channel jumps that moves from one reference tick to the next by this many times what a window may move by in the mean.
 const JUMP: f32 = 3.0;
 
-/// Ticks that are looked at in a sub-rate tick at most, beside those that are new. A lane that begins has faded in when all of its
-/// window has been seen; after a new plan what is near is seen first.
+/// Ticks that are looked at in a sub-rate tick at most, beside those that are new. A lane that begins has faded in when all of
+/// its window has been seen; after a new plan what is near is seen first.
 const CATCH_UP: i32 = 8;
 
 /// Where the desired trajectory jumps from one reference tick to the next. Between two offsets of a window that is a motion like

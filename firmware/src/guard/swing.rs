@@ -182,7 +182,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn it_is_a_share_whatever_comes_in(values in prop::collection::vec(any::<[f32; 4]>(), 1..20), rms in any::<f32>(), network in any::<f32>()) {
+        fn it_is_a_share_whatever_comes_in(
+            values in prop::collection::vec(any::<[f32; 4]>(), 1..20), rms in any::<f32>(), network in any::<f32>()
+        ) {
             let (mut swing, settings) = (Swing::NONE, GuardSettings::default());
             for [with, without, response, nominal] in values {
                 swing.rely(network, &settings, TICK);

@@ -23,10 +23,7 @@ mod scratch;
 mod shape;
 mod tanh;
 
-use crate::{
-    format::{Arithmetic, Blob, Floats, MAX_FEATURES, MAX_LAYERS, MAX_OUTPUTS, NetworkLayout, Refusal, ranges},
-    math::abs,
-};
+use crate::format::{Arithmetic, Blob, Floats, MAX_FEATURES, MAX_LAYERS, MAX_OUTPUTS, NetworkLayout, Refusal, ranges};
 
 pub use crate::format::Activation;
 pub use requantisation::requantise;
@@ -145,7 +142,8 @@ impl<'a> Network<'a> {
     }
 
     /// Evaluates the network: `inputs` in physical units, one for each feature; `outputs` in the units of the corrected channels.
-    /// Whatever comes in, an output is finite: one that would be beyond [`ranges::MAGNITUDE`] or no number is 0.
+    /// Inputs that no training has can make an output that is no finite number; [`Job::run`](crate::adapter::Job::run) leaves it
+    /// out.
     /// A scratch of fewer words than [`Network::scratch_words`], or fewer inputs than features, leave `outputs` as they are.
     #[inline]
     pub fn evaluate<const WORDS: usize>(&self, inputs: &[f32], outputs: &mut [f32], scratch: &mut Scratch<WORDS>) {
@@ -157,6 +155,7 @@ impl<'a> Network<'a> {
         let Some((front, back)) = self.halves(scratch.words()) else { return };
         self.normalise(inputs, self.normalised(front, back));
         self.run(None, outputs, scratch.words());
+        outputs.iter_mut().for_each(|output| *output = meant(*output));
     }
 
     /// The scratch's two parts; `None`: it has too few words.
@@ -228,27 +227,16 @@ impl<'a> Network<'a> {
     #[inline(always)]
     fn denormalise(&self, values: impl Iterator<Item = f32>, outputs: &mut [f32]) {
         let denormalisation = self.output_scale.iter().zip(self.output_mean.iter());
-        let mut sum = 0.0;
         for ((output, value), (scale, mean)) in outputs.iter_mut().zip(values).zip(denormalisation) {
             let skip = if self.skip.is_some() { *output } else { 0.0 };
             *output = (skip + value) * scale + mean;
-            sum += abs(*output);
-        }
-        // One comparison for all: a sum of magnitudes that is small has no large one, and none that is no number.
-        let small = sum <= ranges::MAGNITUDE;
-        if !small {
-            leave_out(outputs, self.output_scale.len());
         }
     }
 }
 
-/// Neither NaN nor an infinity, nor a number that would make one of the next: none of it was meant, so no correction.
-#[cold]
-#[inline(never)]
-fn leave_out(outputs: &mut [f32], count: usize) {
-    for output in outputs.iter_mut().take(count) {
-        *output = if abs(*output) <= ranges::MAGNITUDE { *output } else { 0.0 };
-    }
+/// An output that is no number, or larger than any that is believed, was not meant: 0.
+pub(crate) fn meant(output: f32) -> f32 {
+    if crate::math::abs(output) <= ranges::MAGNITUDE { output } else { 0.0 }
 }
 
 /// Checks that the layers' shapes follow from each other; gives their number of multiplications.

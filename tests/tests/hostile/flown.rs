@@ -31,7 +31,8 @@ const FACTORS: [f64; 2] = [1.1, 1.5];
 const MORE: f64 = 0.01;
 /// Seconds over which errors are compared.
 const WINDOW: f64 = 4.0;
-/// The baseline is lost beyond this error and what is desired to change at once, m, or beyond this many times its RMS without delay and so much more, m.
+/// The baseline is lost beyond this error and what is desired to change at once, m, or beyond this many times its RMS without
+/// delay and so much more, m.
 const LOST: f64 = 2.0;
 const LOST_TIMES: f64 = 5.0;
 const LOST_MORE: f64 = 0.5;

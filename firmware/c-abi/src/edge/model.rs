@@ -2,9 +2,12 @@
 
 use core::ffi::c_char;
 
-use impromptu_firmware::{model::Model, network::Scratch};
+use impromptu_firmware::{
+    model::{Model, Refusal},
+    network::Scratch,
+};
 
-use super::{Made, Place, checked, create, input, object, report, view};
+use super::{Begun, Made, Place, checked, create, input, object, report, view};
 use crate::{
     memory::{ModelMemory, Object, ScratchMemory},
     status::Status,
@@ -40,20 +43,30 @@ pub unsafe extern "C" fn impromptu_model_create(model: *mut ModelMemory, size: u
     }
 }
 
-/// Loads a model where it will live, or, if it is refused, the one again that was there before.
+/// Makes a place for a model an empty one. On its way it may be on the stack, which is free again for the load.
 #[inline(never)]
+unsafe fn begin<'p>(made: Made<'p, Model<'static>>) -> Begun<'p, Model<'static>> {
+    // SAFETY: the module's rules.
+    unsafe { made.begin(Model::empty()) }
+}
+
+/// Loads a model, or, if it is refused, the one that was there before, and says why; an error leaves none.
+#[inline(never)]
+fn fill(place: &mut Model<'static>, bytes: &'static [u8], before: Option<&'static [u8]>) -> Result<Option<Refusal>, Status> {
+    let mut scratch = Scratch::new();
+    let Err(refusal) = Model::load_into(place, bytes, &mut scratch) else { return Ok(None) };
+    match before {
+        // It passed every check before.
+        Some(file) if Model::load_into(place, file, &mut scratch).is_ok() => Ok(Some(refusal)),
+        _ => Err(refusal.into()),
+    }
+}
+
+/// Loads a model where it will live, or, if it is refused, the one again that was there before.
 unsafe fn load(made: Made<'_, Model<'static>>, bytes: &'static [u8], before: Option<&'static [u8]>) -> Result<(), Status> {
     // SAFETY: the module's rules.
-    let mut place = unsafe { made.begin(Model::empty()) };
-    let mut scratch = Scratch::new();
-    let refusal = match Model::load_into(place.value(), bytes, &mut scratch) {
-        Ok(_) => None,
-        Err(refusal) => match before {
-            // It passed every check before.
-            Some(file) if Model::load_into(place.value(), file, &mut scratch).is_ok() => Some(refusal),
-            _ => return Err(refusal.into()),
-        },
-    };
+    let mut place = unsafe { begin(made) };
+    let refusal = fill(place.value(), bytes, before)?;
     place.finish();
     refusal.map_or(Ok(()), |refusal| Err(refusal.into()))
 }

@@ -10,7 +10,6 @@
 
 use nalgebra::Vector3;
 
-use super::QuadrotorAdapter;
 use crate::{quadrotor::DESIRED, types::State};
 
 /// A position that comes ten times a second stands still for 0.1 s.
@@ -73,13 +72,12 @@ impl Frozen {
     /// Nothing seen yet: all zeros.
     pub(super) const EMPTY: Self = Self { axes: [Axis::NONE; 3], velocity: Vector3::new(0.0, 0.0, 0.0), seconds: 0.0 };
 
-    /// A reference tick: tells the adapter what a state says, where this is desired.
+    /// A reference tick at a rate, Hz, with the state as it is measured and what is desired. Returns for how many ticks the
+    /// position has stood still, if it must have changed since; else 0.
     #[inline(never)]
-    pub(super) fn tell(&mut self, adapter: &mut QuadrotorAdapter<'_>, state: &State, desired: &[f32; DESIRED]) {
+    pub(super) fn ticks(&mut self, state: &State, desired: &[f32; DESIRED], rate_hz: f32) -> u16 {
         let [_, _, _, vx, vy, vz, ..] = *desired;
-        let rate_hz = adapter.rate_hz();
-        let stands = self.observe(&state.position, &state.velocity, &Vector3::new(vx, vy, vz), 1.0 / rate_hz);
-        adapter.set_standing((stands * rate_hz) as u16);
+        (self.observe(&state.position, &state.velocity, &Vector3::new(vx, vy, vz), 1.0 / rate_hz) * rate_hz) as u16
     }
 
     /// A reference tick of `dt` seconds with the measured position and velocity and the desired velocity. Returns how long the
