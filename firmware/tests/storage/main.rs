@@ -5,6 +5,4 @@ mod models;
 
 mod cuts;
 mod damage;
-#[cfg(feature = "signed")]
-mod signed;
 mod uploads;

@@ -2,8 +2,6 @@
 
 mod demo;
 mod diagnose;
-#[cfg(unix)]
-mod files;
 mod program;
 mod refusals;
 mod steps;

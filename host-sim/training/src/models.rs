@@ -71,7 +71,6 @@ pub fn describe(
         envelope: rows.envelope.clone(),
         feedback_lane: lane.cloned(),
         monitor: None,
-        tie: None,
     }
 }
 

@@ -71,9 +71,7 @@ impl<'a> Software<'a> {
         condition: &Condition,
         plan: &FlightPlan<'a>,
     ) -> Result<Self, RolloutError> {
-        settings.check().map_err(|refusal| RolloutError::Airframe(format!("`{}`: {refusal}", vehicle.name)))?;
-        let mut flight = Flight::empty();
-        flight.configure(settings);
+        let mut flight = Flight::new(settings).ok_or_else(|| RolloutError::Airframe(vehicle.name.clone()))?;
         if let Some((model, lanes)) = plan.model {
             flight.attach(model, lanes)?;
             if let Some(adapter) = flight.adapter() {
