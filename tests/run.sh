@@ -180,7 +180,7 @@ bare_targets() {
     {
         cargo check $(packages $libraries) $(targets $(echo "$bare" | tr ' ' '\n' | grep -vx $target)) --locked
         (cross check $(packages $libraries) --target $target --locked)
-        (cross check --package impromptu-firmware --features defmt,serde --target $target --locked)
+        (cross check --package impromptu-firmware --features defmt,serde,signed --target $target --locked)
     }
 }
 
@@ -236,6 +236,8 @@ unit_tests() {
 all_tests() {
     say "tests"
     cargo test --workspace --locked --profile checked
+    say "signed models"
+    cargo test --package impromptu-firmware --features signed --test storage --locked --profile checked
 }
 
 long_tests() {

@@ -18,7 +18,7 @@ use impromptu_firmware::{
     model::{MAX_FEATURES, MAX_OUTPUTS, Model},
     network::{Network, Scratch},
 };
-use servo::{RATE_HZ, SIGNALS, Servo, TrackingError, desired};
+use servo::{CAPS, RATE_HZ, SIGNALS, Servo, TrackingError, desired};
 
 /// What training left.
 const MODEL: &[u8] = include_bytes!("one_axis.impromptu");
@@ -65,7 +65,7 @@ pub(crate) fn fly(free: impl Fn(i32) -> bool) -> Result<(TrackingError, Report),
     let model = Model::from_bytes(MODEL)?;
     let network = model.network().ok_or("the model has no network")?;
     let ahead = model.card().preview_span().1 as i32;
-    let add_on = AddOn::new(&model, SIGNALS, RATE_HZ)?;
+    let add_on = AddOn::new(&model, SIGNALS, RATE_HZ, &CAPS)?;
     let mut control = Control { add_on, servo: Servo::new(), error: TrackingError::new() };
     control.add_on.defer();
     control.add_on.switch(Lanes::BOTH);

@@ -8,7 +8,7 @@ pub(crate) mod servo;
 use std::error::Error;
 
 use impromptu_firmware::{adapter::Lanes, add_on::AddOn, model::Model, network::Scratch};
-use servo::{RATE_HZ, SIGNALS, Servo, TrackingError, desired};
+use servo::{CAPS, RATE_HZ, SIGNALS, Servo, TrackingError, desired};
 
 /// What training left.
 const MODEL: &[u8] = include_bytes!("one_axis.impromptu");
@@ -18,7 +18,7 @@ const TICKS: i32 = 20 * RATE_HZ as i32;
 /// Follows the trajectory with these lanes.
 pub(crate) fn fly(lanes: Lanes) -> Result<TrackingError, Box<dyn Error>> {
     let model = Model::from_bytes(MODEL)?;
-    let mut add_on = AddOn::<1, 1, 1, 128>::new(&model, SIGNALS, RATE_HZ)?;
+    let mut add_on = AddOn::<1, 1, 1, 128>::new(&model, SIGNALS, RATE_HZ, &CAPS)?;
     let ahead = model.card().preview_span().1 as i32;
     let mut scratch = Scratch::new();
     add_on.switch(lanes);

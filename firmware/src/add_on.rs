@@ -31,28 +31,41 @@ use core::fmt;
 
 use crate::{
     adapter::{Adapter, Inference, Job, Lanes},
+    caps::Caps,
     guard::{Guard, GuardSettings, Trips},
     model::{Channels, MAX_OUTPUTS, Model, Refusal},
     network::Scratch,
     preview::{EndRule, Preview},
 };
 
-/// A desired channel that is NaN or infinite. Nothing was stored: push another sample for the same tick.
+/// Why a sample of the trajectory was not stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct NotFinite {
-    /// Index of the desired channel.
-    pub channel: usize,
+#[non_exhaustive]
+pub enum PushError {
+    /// A desired channel is NaN or infinite: push another sample for the same tick.
+    NotFinite {
+        /// Index of the desired channel.
+        channel: usize,
+    },
+    /// As many samples as the preview keeps lie ahead of the last reference tick: one more would push out what is still to be
+    /// flown.
+    Full,
 }
 
-impl fmt::Display for NotFinite {
+impl fmt::Display for PushError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "desired channel {} is not a finite number: push another sample for the same tick", self.channel)
+        match self {
+            Self::NotFinite { channel } => {
+                write!(f, "desired channel {channel} is not a finite number: push another sample for the same tick")
+            }
+            Self::Full => f.write_str("the preview is full: push this sample after the next reference ticks"),
+        }
     }
 }
 
-impl core::error::Error for NotFinite {}
+impl core::error::Error for PushError {}
 
 /// What an add-on has done.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -70,10 +83,14 @@ pub struct Report {
     pub saturations: u32,
     /// Inferences that did not come in time.
     pub late: u32,
+    /// Ticks in which the trajectory did not reach as far ahead as the model looks while a lane was wanted.
+    pub starved: u32,
     /// The guard's trips, by lane and reason.
     pub trips: Trips,
     /// Reference tick of the next sample that is pushed.
     pub next_tick: i32,
+    /// Samples of the trajectory ahead of the last reference tick; negative if it has ended.
+    pub reach: i32,
 }
 
 impl Report {
@@ -81,13 +98,15 @@ impl Report {
     pub fn of<const D: usize, const M: usize, const R: usize>(adapter: &Adapter<'_, D, M, R>, next_tick: i32) -> Self {
         let [network_weight, feedback_weight] = adapter.weights();
         Self {
-            correction: *adapter.correction(),
+            correction: adapter.correction(),
+            starved: adapter.starved(),
             network_weight,
             feedback_weight,
             saturations: adapter.saturations(),
             late: adapter.late(),
             trips: adapter.trips(),
             next_tick,
+            reach: adapter.last_tick().map_or(0, |tick| next_tick.wrapping_sub(tick).wrapping_sub(1)),
         }
     }
 }
@@ -110,33 +129,45 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
         Self { adapter: Adapter::empty(), preview: Preview::new([EndRule::Hold; D], 0) }
     }
 
-    /// An add-on with a model for a loop with these signals, whose references run at `rate_hz`, Hz. Both lanes are off; the first
-    /// sample of the trajectory will be that of tick 0.
+    /// An add-on with a model for a loop with these signals, whose references run at `rate_hz`, Hz, and which
+    /// lets corrections be within `caps`. Both lanes are off; the first sample of the trajectory will be that of tick 0.
     ///
     /// # Errors
     /// As [`AddOn::check`].
-    pub fn new<'t>(model: &'m Model<'m>, signals: impl Into<Channels<'t>>, rate_hz: f32) -> Result<Self, Refusal> {
+    pub fn new<'t>(
+        model: &'m Model<'m>,
+        signals: impl Into<Channels<'t>>,
+        rate_hz: f32,
+        caps: &Caps<'_>,
+    ) -> Result<Self, Refusal> {
         let mut add_on = Self::empty();
-        add_on.load(model, signals, rate_hz)?;
+        add_on.load(model, signals, rate_hz, caps)?;
         Ok(add_on)
     }
 
-    /// Whether a model is for a loop with these signals and reference rate, Hz.
+    /// Whether a model is for a loop with these signals, reference rate (Hz) and bounds.
     ///
     /// # Errors
-    /// If the signals differ, the rate does, or the model looks at more than `N` samples of the trajectory.
-    pub fn check<'t>(model: &Model<'_>, signals: impl Into<Channels<'t>>, rate_hz: f32) -> Result<(), Refusal> {
-        Adapter::<D, M, R>::check(model, &signals.into(), rate_hz, N)
+    /// If the signals differ, the rate does, the bounds say too little, or the model looks at more than `N` samples of the
+    /// trajectory.
+    pub fn check<'t>(model: &Model<'_>, signals: impl Into<Channels<'t>>, rate_hz: f32, caps: &Caps<'_>) -> Result<(), Refusal> {
+        Adapter::<D, M, R>::check(model, &signals.into(), rate_hz, caps, N)
     }
 
-    /// [`AddOn::new`] in place; nothing of what was here is left.
+    /// [`AddOn::new`] in place; nothing of what was here is left but a correction, which goes by its slew.
     ///
     /// # Errors
     /// As [`AddOn::check`]; then nothing changes.
-    pub fn load<'t>(&mut self, model: &'m Model<'m>, signals: impl Into<Channels<'t>>, rate_hz: f32) -> Result<(), Refusal> {
+    pub fn load<'t>(
+        &mut self,
+        model: &'m Model<'m>,
+        signals: impl Into<Channels<'t>>,
+        rate_hz: f32,
+        caps: &Caps<'_>,
+    ) -> Result<(), Refusal> {
         let signals = signals.into();
-        Self::check(model, signals, rate_hz)?;
-        self.adapter.load(model, &signals);
+        Self::check(model, signals, rate_hz, caps)?;
+        self.adapter.load(model, &signals, caps);
         self.preview.restart(end_rules(&signals), 0);
         Ok(())
     }
@@ -163,13 +194,31 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
     /// [`Card::preview_span`](crate::model::Card::preview_span); what is missing is taken as the trajectory's end.
     ///
     /// # Errors
-    /// If a number is not finite; then nothing is stored.
-    pub fn push(&mut self, desired: [f32; D]) -> Result<(), NotFinite> {
+    /// If a number is not finite, or the preview is full; then nothing is stored.
+    pub fn push(&mut self, desired: [f32; D]) -> Result<(), PushError> {
         if let Some(channel) = desired.iter().position(|value| !value.is_finite()) {
-            return Err(NotFinite { channel });
+            return Err(PushError::NotFinite { channel });
+        }
+        // The oldest sample goes: it must have been flown.
+        if self.preview.is_full()
+            && self.adapter.last_tick().is_none_or(|tick| self.preview.oldest_tick().wrapping_sub(tick) >= 0)
+        {
+            return Err(PushError::Full);
         }
         self.preview.push(desired);
         Ok(())
+    }
+
+    /// Whether there is a sample of the trajectory.
+    pub fn has_trajectory(&self) -> bool {
+        !self.preview.is_empty()
+    }
+
+    /// Forgets the samples of tick `from` and later, in whose place others will be pushed: the next one is that of `from`, unless
+    /// fewer had been pushed. What lies before stays: for another trajectory from there on.
+    pub fn truncate(&mut self, from: i32) {
+        self.preview.truncate(from);
+        self.adapter.replanned(from);
     }
 
     /// Tick of the next sample that is pushed.
@@ -186,6 +235,7 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
     /// measured: for a jump of the trajectory on the way.
     pub fn clear(&mut self, first_tick: i32) {
         self.preview.clear(first_tick);
+        self.adapter.replanned(first_tick);
     }
 
     /// Forgets the trajectory and everything that was measured and corrected, but for the counts and the lanes that are wanted,

@@ -14,6 +14,18 @@ pub trait Signals {
     fn measured(&self, tick: i32, channel: usize) -> f32;
     /// Reference channel that was applied at a tick.
     fn reference(&self, tick: i32, channel: usize) -> f32;
+
+    /// A channel `offset` sub-rate ticks, of `divisor` reference ticks each, after the sub-rate tick at `tick`. Who is asked for
+    /// one sub-rate tick only knows where that is in its histories, and need not divide for it.
+    #[inline]
+    fn at(&self, source: Source, tick: i32, offset: i16, divisor: i32, channel: usize) -> f32 {
+        let at = tick.wrapping_add(i32::from(offset).wrapping_mul(divisor));
+        match source {
+            Source::Desired => self.desired(at, channel),
+            Source::Measured => self.measured(at, channel),
+            Source::Reference => self.reference(at, channel),
+        }
+    }
 }
 
 impl Feature {
@@ -21,19 +33,13 @@ impl Feature {
     /// `divisor` is the number of reference ticks in a sub-rate tick.
     #[inline]
     pub fn evaluate(&self, signals: &impl Signals, tick: i32, divisor: i32) -> f32 {
-        let at = tick.wrapping_add(i32::from(self.offset).wrapping_mul(divisor));
-        let channel = usize::from(self.channel);
-        let value = match self.source {
-            Source::Desired => signals.desired(at, channel),
-            Source::Measured => signals.measured(at, channel),
-            Source::Reference => signals.reference(at, channel),
-        };
-        let origin = match self.relative {
+        let value = signals.at(self.source, tick, self.offset, divisor, usize::from(self.channel));
+        let (source, origin) = match self.relative {
             Relative::Nothing => return value,
-            Relative::Desired(origin) => signals.desired(tick, usize::from(origin)),
-            Relative::Measured(origin) => signals.measured(tick, usize::from(origin)),
+            Relative::Desired(origin) => (Source::Desired, origin),
+            Relative::Measured(origin) => (Source::Measured, origin),
         };
-        value - origin
+        value - signals.at(source, tick, 0, divisor, usize::from(origin))
     }
 }
 

@@ -8,7 +8,7 @@
 use heapless::Vec;
 
 use crate::{
-    format::{Blob, FeedbackAxis, FeedbackLayout, Floats, MAX_AXES, MAX_ERRORS, MAX_LAGS, Refusal},
+    format::{Blob, FeedbackAxis, FeedbackLayout, Floats, MAX_AXES, MAX_ERRORS, MAX_LAGS, Refusal, ranges},
     math::{abs, clamp, finite_or_zero},
 };
 
@@ -66,6 +66,7 @@ impl<'a> Lane<'a> {
         for axis in &layout.axes {
             let count = axis.errors.len() * lags;
             let coefficients = blob.floats(axis.coefficients, count + lags, "lane coefficients")?;
+            ranges::LANE_COEFFICIENTS.all(coefficients)?;
             let (errors, outputs) = coefficients.split_at(count);
             // With a constant output s and no error, s = sum(c) s + integral share: the share's steady state.
             let denominator = 1.0 - outputs.iter().sum::<f32>();
@@ -117,7 +118,8 @@ impl AxisState {
         self.clamped
     }
 
-    /// Takes this tick's errors (in the order of the layout) and returns the lane's output on this axis.
+    /// Takes this tick's errors (in the order of the layout) and returns the lane's output on this axis: finite and within both
+    /// clamps, whatever comes in.
     /// `authority` (0..=1) scales the fast clamp and what is integrated; `dt` is the reference's period, s. While not `active`
     /// the lags are filled and the integral stands still: a lane that is faded out must not lose its slow part at once;
     /// [`AxisState::clear_integral`] empties it afterwards.
@@ -144,6 +146,7 @@ impl AxisState {
             fast += dot(these, lagged, 0.0);
         }
         fast += dot(axis.outputs, &self.outputs, slow);
+        let authority = clamp(authority, 0.0, 1.0);
         let fast_limit = layout.fast_limit * authority;
         let bounded = clamp(fast, -fast_limit, fast_limit);
         self.clamped = bounded != fast;
@@ -154,7 +157,7 @@ impl AxisState {
             let bound = axis.integral_bound;
             self.integral = clamp(self.integral + finite_or_zero(increment), -bound, bound);
         }
-        finite_or_zero(bounded) + slow
+        bounded + slow
     }
 
     /// Tells the axis what was really applied of its output.
@@ -188,7 +191,9 @@ fn dot(coefficients: Floats<'_>, values: &[f32; MAX_LAGS], offset: f32) -> f32 {
             *sum += coefficient * (value - offset);
         }
     }
-    let tail = coefficients.iter().zip(values).skip(whole);
+    // Split off: to skip the blocks would be to go through them again.
+    let (_, tail) = coefficients.split_at(whole);
+    let tail = tail.iter().zip(values.get(whole..).unwrap_or_default());
     let rest = tail.fold(0.0, |sum, (coefficient, value)| sum + coefficient * (value - offset));
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }

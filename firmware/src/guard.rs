@@ -5,17 +5,19 @@
 //! *source* the Simplex architecture (Sha 2001): a simple loop that is trusted, a complex one that is watched.
 //!
 //! A lane that trips is handed over by fade, and comes back by fade when its cause has been absent for the hold time. A lane that
-//! the counterfactual monitor has tripped several times stays off until it is armed again.
+//! has tripped several times by what it is itself to blame for (saturated, harm, oscillation, astray) stays off until it is armed
+//! again. The feedback lane acts less before it trips astray.
 
 mod counterfactual;
 mod monitor;
 mod observation;
 mod oscillation;
 mod settings;
+mod swing;
 mod trip;
 mod watch;
 
-use crate::{lanes::Lanes, math::abs};
+use crate::lanes::Lanes;
 
 pub use counterfactual::Counterfactual;
 pub use monitor::Monitor;
@@ -95,6 +97,11 @@ impl Guard {
         Lanes { network: wanted.network && !self.network.tripped(), feedback: wanted.feedback && !self.feedback.tripped() }
     }
 
+    /// Whether the loop swings more than it may after what is desired.
+    pub(crate) fn swinging(&self) -> bool {
+        self.counterfactual.swing().swinging()
+    }
+
     /// Trips since the start.
     pub fn trips(&self) -> Trips {
         self.trips
@@ -136,7 +143,12 @@ impl Guard {
             self.judge(seen);
         }
         let handover_step = ewma_gain(1.0 / (self.settings.handover_s * self.rate_hz));
-        Verdict { allowed: self.allowed(seen.wanted), handover_step }
+        // Without a trajectory there is nothing to correct.
+        let allowed = if seen.trajectory { self.allowed(seen.wanted) } else { Lanes::NONE };
+        // Without a monitor nobody knows what swings.
+        let judged = self.settings.enabled && seen.monitor.is_some();
+        let share = if judged { self.counterfactual.swing().share() } else { 1.0 };
+        Verdict { allowed, handover_step, share }
     }
 
     /// What the lanes did in the last reference tick. If none acted, or ticks are missing since, all that was learned is
@@ -156,34 +168,43 @@ impl Guard {
             None => self.oscillation = Oscillation::NONE,
         }
         if let Some(monitor) = seen.monitor {
-            self.counterfactual.observe(monitor, &last.errors, &last.shares, settings, self.rate_hz);
+            self.counterfactual.observe(monitor, last, settings, self.rate_hz);
         }
     }
 
     /// Trips lanes and lets them come back.
     fn judge(&mut self, seen: &Observation<'_>) {
         let settings = &self.settings;
-        let stale = f32::from(seen.age) > settings.stale_s * self.rate_hz;
+        let late_by = settings.stale_s * self.rate_hz;
+        let stale = f32::from(seen.age.saturating_add(seen.bad)) > late_by;
+        // One bad sample is one missed sample.
+        let not_finite = !seen.finite || f32::from(seen.bad) > late_by;
         let outside = self.outside >= settings.envelope_ticks.max(1);
         let late = seen.late >= settings.late_in_a_row.max(1);
         let [network_excess, feedback_excess] = self.excess.map(|share| share > settings.saturated_share);
         let [network_harms, feedback_harms] = self.counterfactual.harmful();
         let swings = self.oscillation.present(settings);
-        let first = |causes: [(bool, Trip); 7]| causes.into_iter().find(|(present, _)| *present).map(|(_, trip)| trip);
-        let cause = |own: [bool; 5]| {
-            let [outside, late, swings, excess, harms] = own;
+        // A lane that shook the loop comes back when the loop is calm. Until then what swings says nothing about the network.
+        let swing = self.counterfactual.swing();
+        let shaken = swing.swinging() && self.feedback.tripped_by(Trip::Astray);
+        let astray = swing.astray() || shaken;
+        let network_harms = network_harms && !shaken;
+        let first = |causes: [(bool, Trip); 8]| causes.into_iter().find(|(present, _)| *present).map(|(_, trip)| trip);
+        let cause = |own: [bool; 6]| {
+            let [outside, late, swings, excess, harms, astray] = own;
             first([
-                (!seen.finite, Trip::NotFinite),
+                (not_finite, Trip::NotFinite),
                 (stale, Trip::Stale),
                 (outside, Trip::Envelope),
                 (late, Trip::Late),
                 (swings, Trip::Oscillation),
                 (excess, Trip::Saturated),
                 (harms, Trip::Counterfactual),
+                (astray, Trip::Astray),
             ])
         };
-        let network = cause([outside, late, false, network_excess, network_harms]).filter(|_| seen.wanted.network);
-        let feedback = cause([false, false, swings, feedback_excess, feedback_harms]).filter(|_| seen.wanted.feedback);
+        let network = cause([outside, late, false, network_excess, network_harms, false]).filter(|_| seen.wanted.network);
+        let feedback = cause([false, false, swings, feedback_excess, feedback_harms, astray]).filter(|_| seen.wanted.feedback);
         let hold = (settings.hold_s * self.rate_hz) as u32;
         let network = self.network.tick(network, hold, settings);
         let feedback = self.feedback.tick(feedback, hold, settings);
@@ -193,9 +214,4 @@ impl Guard {
             }
         }
     }
-}
-
-/// Whether all channels are finite numbers.
-pub(crate) fn finite(channels: &[f32]) -> bool {
-    channels.iter().all(|channel| abs(*channel) < f32::INFINITY)
 }

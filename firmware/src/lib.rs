@@ -18,15 +18,17 @@
 //! trajectory and the loop. In a static, without a model, with the network in another task: see there, and `examples/`.
 //!
 //! ```
-//! use impromptu_firmware::{AddOn, Channel, Channels, EndRule, Lanes, Model, Scratch};
+//! use impromptu_firmware::{AddOn, Cap, Caps, Channel, Channels, EndRule, Lanes, Model, Scratch};
 //!
 //! // What the loop is told, measures, and tracks. A model for anything else is refused.
 //! const ANGLE: Channel = Channel { name: "angle", unit: "rad", frame: "output shaft", end: EndRule::Hold };
 //! const SIGNALS: Channels = Channels { desired: &[ANGLE], measured: &[ANGLE], reference: &[ANGLE] };
+//! // What corrections may be, whatever a model says: rad, rad/s.
+//! const CAPS: Caps = Caps { channels: &[Cap { limit: 0.5, rate: 20.0 }], sums: &[] };
 //!
 //! let model = Model::from_bytes(include_bytes!("../examples/one_axis.impromptu"))?;
 //! let ahead = model.card().preview_span().1 as i32;
-//! let mut add_on = AddOn::<1, 1, 1, 128>::new(&model, SIGNALS, 500.0)?;
+//! let mut add_on = AddOn::<1, 1, 1, 128>::new(&model, SIGNALS, 500.0, &CAPS)?;
 //! let mut scratch = Scratch::new();
 //! add_on.switch(Lanes::BOTH);
 //! # use impromptu_firmware::math::sin_cos;
@@ -69,6 +71,7 @@
 //! | 1 | `exchange` | hand-over between tasks without a lock: newest value, queue of bytes |
 //! | 2 | `format` | a model file: its bytes, the types that they become, why one is refused |
 //! | 2 | `region` | which of several modules acts, by operating region |
+//! | 3 | `caps` | bounds of the correction that the application sets |
 //! | 3 | `preview` | the desired trajectory around the present |
 //! | 3 | `features` | network inputs, evaluated from the list in the model |
 //! | 3 | `network` | the network lane's map, with its kernels |
@@ -93,6 +96,7 @@
 
 pub mod adapter;
 pub mod add_on;
+pub mod caps;
 pub mod exchange;
 pub mod features;
 pub mod feedback;
@@ -108,6 +112,7 @@ pub mod storage;
 
 pub use adapter::{Adapter, Inference, Job};
 pub use add_on::AddOn;
+pub use caps::{Cap, Caps, SumCap};
 pub use format::{Channel, Channels, EndRule, Refusal};
 pub use guard::{GuardSettings, Trip, Trips};
 pub use lanes::Lanes;

@@ -57,15 +57,22 @@ pub fn coarse_asin(x: f32) -> f32 {
     coarse_atan2(x, sqrt((1.0 - x) * (1.0 + x)))
 }
 
-/// `x` within `low..=high`; unlike `f32::clamp` without a panic for bounds in the wrong order. NaN stays NaN.
+/// `x` within `low..=high`; unlike `f32::clamp` without a panic for bounds in the wrong order. NaN does not pass: it becomes the
+/// number within the bounds that is nearest to 0, and 0 if they are no bounds either.
 #[inline(always)]
 pub fn clamp(x: f32, low: f32, high: f32) -> f32 {
     if x < low {
         low
+    } else if x <= high {
+        x
     } else if x > high {
         high
+    } else if low > 0.0 {
+        low
+    } else if high < 0.0 {
+        high
     } else {
-        x
+        0.0
     }
 }
 
@@ -75,9 +82,55 @@ pub fn finite_or_zero(x: f32) -> f32 {
     if x.is_finite() { x } else { 0.0 }
 }
 
+/// Whether all are finite numbers: what is none is no zero when it is multiplied by zero, and stays so in a sum. Two instructions
+/// a number.
+#[inline]
+pub fn all_finite(values: &[f32]) -> bool {
+    values.iter().fold(0.0, |sum, value| sum + value * 0.0) == 0.0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn nothing_but_a_number_within_the_bounds_passes_a_clamp(x: u32, low: u32, high: u32, like in 0..4) {
+            // Every bit pattern, and those of which at least one is no number or an end.
+            let [mut x, mut low, mut high] = [x, low, high].map(f32::from_bits);
+            match like {
+                0 => x = f32::NAN,
+                1 => low = f32::NAN,
+                2 => high = f32::NAN,
+                _ => {}
+            }
+            let found = clamp(x, low, high);
+            prop_assert!(!found.is_nan(), "{x} in {low}..={high}");
+            if low <= high {
+                prop_assert!(low <= found && found <= high, "{x} in {low}..={high}: {found}");
+                if low <= x && x <= high {
+                    prop_assert_eq!(found.to_bits(), x.to_bits());
+                }
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn one_that_is_not_finite_is_found_among_all(bits in prop::collection::vec(any::<u32>(), 0..20), like in 0..4usize) {
+            let mut values: Vec<f32> = bits.into_iter().map(f32::from_bits).collect();
+            values.extend([f32::NAN, f32::INFINITY, f32::NEG_INFINITY].get(like));
+            prop_assert_eq!(all_finite(&values), values.iter().all(|value| value.is_finite()));
+            values.retain(|value| value.is_finite());
+            prop_assert!(all_finite(&values));
+        }
+    }
+
+    #[test]
+    fn what_is_no_number_becomes_the_nearest_to_zero() {
+        assert_eq!([clamp(f32::NAN, -1.0, 1.0), clamp(f32::NAN, 2.0, 3.0), clamp(f32::NAN, -3.0, -2.0)], [0.0, 2.0, -2.0]);
+    }
 
     #[test]
     fn coarse_angles_stay_within_the_documented_error() {

@@ -25,20 +25,31 @@ pub struct Model<'a> {
     envelope: (Floats<'a>, Floats<'a>),
     bounds: Bounds<'a>,
     checksum: u32,
+    /// The whole file.
+    file: &'a [u8],
 }
 
 impl<'a> Model<'a> {
-    /// No model: where [`Model::load_into`] puts one.
-    pub const EMPTY: Self = Self {
-        card: Card::EMPTY,
-        blob: Blob::new(&[]),
-        network: None,
-        feedback: None,
-        monitor: None,
-        envelope: (Floats::EMPTY, Floats::EMPTY),
-        bounds: Bounds::EMPTY,
-        checksum: 0,
-    };
+    /// No model: where [`Model::load_into`] puts one. A static that starts with it has 4 KB of flash for its few numbers that are
+    /// not zero; made at run time, by [`Model::empty`], it has none.
+    pub const EMPTY: Self = Self::empty();
+
+    /// [`Model::EMPTY`], made where it is called: a few words are written, what no list has yet is not.
+    // Apart from where it is put, whose stack frame need not hold its parts beside it.
+    #[inline(never)]
+    pub const fn empty() -> Self {
+        Self {
+            card: Card::empty(),
+            blob: Blob::new(&[]),
+            network: None,
+            feedback: None,
+            monitor: None,
+            envelope: (Floats::EMPTY, Floats::EMPTY),
+            bounds: Bounds::EMPTY,
+            checksum: 0,
+            file: &[],
+        }
+    }
 
     /// Checks a model file and borrows its numbers.
     ///
@@ -66,7 +77,7 @@ impl<'a> Model<'a> {
     /// Stage by stage, none of which leaves anything on the stack for the next.
     #[inline(never)]
     fn load(&mut self, bytes: &'a [u8], scratch: &mut Scratch) -> Result<(), Refusal> {
-        let Self { card, blob, network, feedback, monitor, envelope, bounds, checksum } = self;
+        let Self { card, blob, network, feedback, monitor, envelope, bounds, checksum, file } = self;
         load_card(bytes, card, blob)?;
         validate::card(card)?;
         (*network, *feedback, *monitor) = (None, None, None);
@@ -82,7 +93,7 @@ impl<'a> Model<'a> {
         if let Some(lane) = feedback {
             validate::lane_probe(card, blob, lane)?;
         }
-        *checksum = file::checksum(bytes);
+        (*checksum, *file) = (self::file::checksum(bytes), bytes);
         Ok(())
     }
 
@@ -121,6 +132,11 @@ impl<'a> Model<'a> {
         &self.bounds
     }
 
+    /// The whole file, which has passed every check.
+    pub fn file(&self) -> &'a [u8] {
+        self.file
+    }
+
     /// CRC-32 that identifies the file.
     pub fn checksum(&self) -> u32 {
         self.checksum
@@ -143,11 +159,13 @@ fn load_rest<'a>(
     bounds: &mut Bounds<'a>,
 ) -> Result<(), Refusal> {
     *envelope = blob.floats(card.envelope, 2 * card.features.len(), "envelope")?.split_at(card.features.len());
+    [envelope.0, envelope.1].into_iter().try_for_each(|ends| ranges::ENVELOPE.all(ends))?;
     if envelope.0.iter().zip(envelope.1.iter()).any(|(low, high)| low > high) {
         return Err(Refusal::Value { what: "envelope" });
     }
     if let Some(layout) = &card.monitor {
-        *monitor = Some(Monitor::new(layout, blob)?);
+        let loaded = monitor.insert(Monitor::new(layout, blob)?);
+        loaded.axes().iter().try_for_each(|(_, taps)| ranges::TAPS.all(*taps))?;
     }
     *bounds = Bounds::new(card, blob)?;
     Ok(())

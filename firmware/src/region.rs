@@ -127,17 +127,27 @@ impl<const N: usize> Selector<N> {
         self.fade();
     }
 
-    /// What the modules want, mixed by their shares. All zero before the first number.
+    /// What the modules want, mixed by their shares. All zero before the first number. While several have a share, what one of
+    /// them wants and is no finite number leaves its share to the others.
     pub fn mix<const R: usize>(&self, wanted: &[[f32; R]; N]) -> [f32; R] {
-        let mut sum = [0.0; R];
+        let (mut sum, mut left) = ([0.0; R], [0.0_f32; R]);
         for (share, wanted) in self.shares.iter().zip(wanted) {
             if *share == 1.0 {
                 return *wanted;
             }
             if *share > 0.0 {
-                for (sum, wanted) in sum.iter_mut().zip(wanted) {
-                    *sum += share * wanted;
+                for ((sum, left), wanted) in sum.iter_mut().zip(&mut left).zip(wanted) {
+                    if wanted.is_finite() {
+                        *sum += share * wanted;
+                    } else {
+                        *left += share;
+                    }
                 }
+            }
+        }
+        for (sum, left) in sum.iter_mut().zip(left) {
+            if left > 0.0 {
+                *sum = if left < 0.999 { *sum / (1.0 - left) } else { 0.0 };
             }
         }
         sum
@@ -186,6 +196,20 @@ impl<const N: usize> Selector<N> {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn what_is_no_number_leaves_its_share_to_the_other() {
+        let mut selector = two(0.0, 4);
+        selector.select(0.0);
+        selector.select(1.0);
+        let [first, second] = *selector.shares();
+        assert!(first > 0.0 && second > 0.0);
+        for wrong in [f32::NAN, f32::INFINITY] {
+            let [mixed, plain] = selector.mix(&[[wrong, 1.0], [2.0, 3.0]]);
+            assert!((mixed - 2.0).abs() < 1e-6 && (1.0..3.0).contains(&plain), "{mixed} {plain}");
+            assert_eq!(selector.mix(&[[wrong], [wrong]]), [0.0]);
+        }
+    }
 
     fn two(hysteresis: f32, fade_ticks: u16) -> Selector<2> {
         Selector::new([0.0, 1.0], hysteresis, fade_ticks).unwrap()

@@ -27,6 +27,11 @@
 //! # Ok::<(), storage::StorageError>(())
 //! ```
 //!
+//! With the feature `signed`, `Uploader::require` makes the commit ask for a signature ([`crate::format::trailer`]) of one of
+//! the application's keys, and for a version that is not below those in the slots: an unsigned, a wrongly signed and an older
+//! model are refused ([`Refusal::Unsigned`], [`Refusal::Signature`], [`Refusal::Downgrade`]), and what is stored stays. Only the
+//! file stands in the header; the trailer lies behind it.
+//!
 //! The crates that keep data in NOR flash do not serve: `sequential-storage` 8 and `ekv` 1 copy an item out of pages into a
 //! buffer, where the kernels read a model of up to 100 KB in place, contiguous and on a boundary of 16 bytes. The former's items
 //! are shorter than 64 KB, the latter's records are cut into chunks; both are async. Only the traits of `embedded-storage` are
@@ -35,6 +40,8 @@
 mod error;
 mod header;
 mod ram;
+#[cfg(feature = "signed")]
+mod signed;
 mod slot;
 mod stored;
 mod uploader;
@@ -44,8 +51,10 @@ use crate::{format::Refusal, model::Model, network::Scratch};
 pub use error::{Operation, StorageError};
 pub use header::{HEADER, Header, MAGIC, Sequence, VERSION};
 pub use ram::RamFlash;
+#[cfg(feature = "signed")]
+pub use signed::{Key, Signers};
 pub use slot::Slot;
-pub use stored::{SlotIndex, Stored, Survey, survey};
+pub use stored::{SlotIndex, Stored, Survey, floor, survey};
 pub use uploader::{Arming, Uploader};
 
 /// Start-up: the newest model that is intact and passes `check` (signals, rate, preview of the application), and an uploader for

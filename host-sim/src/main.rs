@@ -5,5 +5,7 @@ use std::process::ExitCode;
 use impromptu_host_sim::cli;
 
 fn main() -> ExitCode {
+    // Without it a temporary file can stay behind, which does no harm.
+    let _ = impromptu_files::interruption::clean_up_when_interrupted();
     cli::run(std::env::args_os())
 }

@@ -75,6 +75,7 @@ fn description(inputs: usize, outputs: usize) -> Description {
         envelope: vec![(-1.0, 1.0); inputs],
         feedback_lane: None,
         monitor: None,
+        tie: None,
     }
 }
 

@@ -1,11 +1,13 @@
-//! The command line: `export`, `inspect`, `verify`.
+//! The command line: `export`, `inspect`, `verify`, `keygen`, `sign`.
 //!
 //! *in* arguments; *out* results on stdout, messages on stderr, an exit code; *never* a file that is half written, or a file
 //! replaced when something failed.
 
+mod ambiguous;
 mod export;
 mod files;
 mod format;
+mod sign;
 mod verify;
 
 use std::{
@@ -16,9 +18,17 @@ use std::{
 
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
+use impromptu_files::text::line;
 use impromptu_firmware::model::Model;
 
-use self::{export::Export, files::read, format::Format, verify::Verify};
+use self::{
+    ambiguous::Ambiguous,
+    export::Export,
+    files::{read, unsigned},
+    format::Format,
+    sign::{Keygen, Sign},
+    verify::Verify,
+};
 use crate::inspection::Inspection;
 
 /// Exit code: all is well.
@@ -29,7 +39,7 @@ pub const FAILED: u8 = 1;
 pub const USAGE: u8 = 2;
 
 const EXAMPLES: &str = "\
-Exit codes: 0 fine, 1 a file was refused or a check failed, 2 wrong arguments.
+Exit codes: 0 fine, 1 a file was refused or a check failed, 2 wrong arguments, or an option is needed that settles something.
 
 Examples:
   model-export export --network out/net.safetensors --output out/net.model
@@ -38,7 +48,11 @@ Examples:
   model-export inspect net.model
   model-export inspect net.model --format json
   model-export verify net.model
-  model-export verify net.model --network net.safetensors --data flights.csv --max-rms-percent 1";
+  model-export verify net.model --network net.safetensors --data flights.csv --max-rms-percent 1
+  model-export keygen fleet.key
+      writes the private key, and fleet.key.pub for the vehicles
+  model-export sign net.model --key fleet.key --model-version 3 --output net.signed.model
+  model-export verify net.signed.model --key fleet.key.pub";
 
 #[derive(Debug, Parser)]
 #[command(
@@ -66,6 +80,10 @@ enum Command {
     },
     /// Re-runs a model file's probes, and compares it with the float network over rows of features.
     Verify(Verify),
+    /// Makes a key with which models are signed.
+    Keygen(Keygen),
+    /// Signs a model file for vehicles that store signed models only.
+    Sign(Sign),
 }
 
 /// Runs the program on `arguments` (the first of them is its name). Returns the exit code.
@@ -84,9 +102,11 @@ where
         }
     };
     let outcome = match arguments.command {
-        Command::Export(export) => export.run(out).map(|()| true),
+        Command::Export(export) => export.run(out, messages).map(|()| true),
         Command::Inspect { file, format } => inspect(&file, format, out).map(|()| true),
         Command::Verify(verify) => verify.run(out, messages),
+        Command::Keygen(keygen) => keygen.run(out).map(|()| true),
+        Command::Sign(sign) => sign.run(out).map(|()| true),
     };
     match outcome {
         Ok(true) => FINE,
@@ -94,15 +114,16 @@ where
         // The reader has seen enough, `inspect … | head`.
         Err(error) if error.downcast_ref::<std::io::Error>().is_some_and(|error| error.kind() == ErrorKind::BrokenPipe) => FINE,
         Err(error) => {
-            let _ = writeln!(messages, "model-export: {error:#}");
-            FAILED
+            let _ = writeln!(messages, "model-export: {}", line(&format!("{error:#}")));
+            if error.is::<Ambiguous>() { USAGE } else { FAILED }
         }
     }
 }
 
 fn inspect(file: &Path, format: Format, out: &mut dyn Write) -> Result<()> {
     let bytes = read(file)?;
-    let model = Model::from_bytes(&bytes).with_context(|| file.display().to_string())?;
-    let inspection = Inspection::new(&model, &bytes);
+    let bytes = unsigned(&bytes);
+    let model = Model::from_bytes(bytes).with_context(|| file.display().to_string())?;
+    let inspection = Inspection::new(&model, bytes);
     format.print(out, &inspection, || inspection.to_string())
 }

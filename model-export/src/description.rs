@@ -9,6 +9,8 @@ use impromptu_firmware::{
 };
 use serde::{Deserialize, Serialize};
 
+use crate::float_network::FloatNetwork;
+
 /// One channel of a signal.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -175,6 +177,64 @@ pub struct MonitorDescription {
     pub axes: Vec<MonitorAxisDescription>,
 }
 
+/// Which network and rows a description belongs to: CRC-32 of their numbers, whatever else a file says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tie {
+    /// Of the network: widths, activations and every tensor.
+    pub network_crc32: u32,
+    /// Of the calibration rows.
+    pub rows_crc32: u32,
+}
+
+impl Tie {
+    /// Of a network and its rows.
+    pub fn of(network: &FloatNetwork, rows: &[Vec<f32>]) -> Self {
+        Self { network_crc32: network_crc32(network), rows_crc32: rows_crc32(rows) }
+    }
+
+    /// What of a network and rows is not what the description belongs to; rows that nobody calibrates on are not asked for.
+    pub fn differs(self, network: &FloatNetwork, rows: &[Vec<f32>]) -> Option<&'static str> {
+        if self.network_crc32 != network_crc32(network) {
+            Some("network's numbers")
+        } else if !rows.is_empty() && self.rows_crc32 != rows_crc32(rows) {
+            Some("calibration rows")
+        } else {
+            None
+        }
+    }
+}
+
+const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+
+fn network_crc32(network: &FloatNetwork) -> u32 {
+    let mut digest = CRC.digest();
+    let mut add = |values: &[f32]| {
+        // The lengths too, so that a number cannot wander from one tensor to the next.
+        digest.update(&(values.len() as u64).to_le_bytes());
+        values.iter().for_each(|value| digest.update(&value.to_le_bytes()));
+    };
+    add(&network.input_mean);
+    add(&network.input_scale);
+    for layer in &network.layers {
+        add(&layer.weights);
+        add(&layer.bias);
+        add(&[f32::from(layer.activation as u8)]);
+    }
+    add(network.skip.as_deref().unwrap_or_default());
+    add(&network.output_mean);
+    add(&network.output_scale);
+    digest.finalize()
+}
+
+fn rows_crc32(rows: &[Vec<f32>]) -> u32 {
+    let mut digest = CRC.digest();
+    for value in rows.iter().flatten() {
+        digest.update(&value.to_le_bytes());
+    }
+    digest.finalize()
+}
+
 /// Everything about a model but the network's tensors.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -199,6 +259,9 @@ pub struct Description {
     /// The loop's response, if it is known: without it the guard cannot judge by evidence.
     #[serde(default)]
     pub monitor: Option<MonitorDescription>,
+    /// The network and rows that this is the description of. Descriptions of other tools and older ones do not say so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tie: Option<Tie>,
 }
 
 impl Description {

@@ -6,7 +6,7 @@ use impromptu_firmware::{
         self, Arithmetic, Authority, Card, Channel, FeedbackAxis, FeedbackLayout, LayerLayout, Model, MonitorAxis, MonitorLayout,
         NetworkLayout, Probes, Refusal, Section, SignalTable, file,
     },
-    network::{self, Scratch, kernel::Width},
+    network::{self, Network, Scratch, kernel::Width},
 };
 
 use crate::{
@@ -265,12 +265,9 @@ pub fn encode(
         card.bounds = blob.floats(output_bounds(&card, &blob, float, &description.envelope)?);
     }
     let lane_outputs = card.feedback.as_ref().map_or(0, |lane| lane.axes.len());
-    // The probes' expected outputs come from the firmware itself, out of a file without probes.
-    let bare_lane = Section { offset: 0, length: 0 };
-    let mut bare = card.clone();
-    bare.probes.feedback = bare_lane;
+    // The probes' expected outputs come from the firmware itself.
     let probe_rows = if card.network.is_some() { probe_rows(description, calibration) } else { Vec::new() };
-    let (outputs, lane_probe) = expected(&bare, &blob, &probe_rows)?;
+    let (outputs, lane_probe) = expected(&card, &blob, &probe_rows)?;
     card.probes = Probes {
         count: probe_rows.len() as u8,
         network: blob.floats(probe_rows.into_iter().flatten().chain(outputs)),
@@ -310,12 +307,13 @@ fn output_bounds(
 
 /// What the firmware computes for the probes.
 fn expected(card: &Card<'_>, blob: &BlobWriter, rows: &[Vec<f32>]) -> Result<(Vec<f32>, [f32; model::MAX_AXES]), ExportError> {
-    let mut without_lane = card.clone();
-    without_lane.feedback = None;
-    let bytes = assemble(&without_lane, &blob.0)?;
-    let model = Model::from_bytes(&bytes).map_err(ExportError::Refused)?;
+    // What has no probe is checked first, in a file without lanes; the lanes need no file.
+    let bare = Card { network: None, feedback: None, bounds: Section::default(), ..card.clone() };
+    Model::from_bytes(&assemble(&bare, &blob.0)?).map_err(ExportError::Refused)?;
     let mut outputs = Vec::new();
-    if let Some(network) = model.network() {
+    if let Some(layout) = &card.network {
+        let network = Network::new(layout, &model::Blob::new(&blob.0), card.features.len(), card.outputs.len());
+        let network = network.map_err(ExportError::Refused)?;
         let mut scratch = Scratch::new();
         for row in rows {
             let mut output = [0.0; model::MAX_OUTPUTS];

@@ -5,6 +5,7 @@
 
 mod text;
 
+use impromptu_files::text::{line, mend};
 use impromptu_firmware::{
     features::{Feature, Relative, Source},
     model::{Arithmetic, Card, Channel, Interpolation, Margins, Model, OutputBounds, Reach, Section, file},
@@ -209,28 +210,28 @@ impl Inspection {
         let outputs = card.outputs.iter().zip(bounds).map(|(output, bounds)| {
             let (name, unit) = channel(&card.signals.reference, output.channel);
             InspectedOutput {
-                name: name.into(),
-                unit: unit.into(),
+                name,
+                unit,
                 limit: output.limit,
                 slew_per_second: output.slew * rate,
                 bounds: bounds.map(|bounds| inspected_bounds(bounds, output.limit)),
             }
         });
         Self {
-            name: card.name.into(),
+            name: text(card.name),
             format_version: file::VERSION,
             size: Size { file: bytes.len(), limit: file::MAX_FILE, card: card_bytes, blob: blob_bytes },
             crc: format!("{:08x}", model.checksum()),
             provenance: Provenance {
-                vehicle: card.provenance.vehicle.into(),
-                gains: card.provenance.gains.into(),
-                condition: card.provenance.condition.into(),
-                software: card.provenance.software.into(),
+                vehicle: text(card.provenance.vehicle),
+                gains: text(card.provenance.gains),
+                condition: text(card.provenance.condition),
+                software: text(card.provenance.software),
                 seed: card.provenance.seed,
                 data_crc: card.provenance.data_crc,
-                remarks: card.provenance.remarks.into(),
+                remarks: text(card.provenance.remarks),
             },
-            signals: Signals::from(&card.signals),
+            signals: signals(card),
             timing: Timing {
                 reference_rate_hz: rate,
                 network_rate_hz: rate / f32::from(timing.divisor),
@@ -251,9 +252,23 @@ impl Inspection {
     }
 }
 
+/// A text of the file, such that it can be printed.
+fn text(text: &str) -> String {
+    line(text).into_owned()
+}
+
+/// The signals, with harmless texts.
+fn signals(card: &Card<'_>) -> Signals {
+    let mut signals = Signals::from(&card.signals);
+    for channel in signals.desired.iter_mut().chain(&mut signals.measured).chain(&mut signals.reference) {
+        [&mut channel.name, &mut channel.unit, &mut channel.frame].into_iter().for_each(mend);
+    }
+    signals
+}
+
 /// Name and unit of a channel; the indices of a loaded model are checked.
-fn channel<'c>(channels: &[Channel<'c>], index: u8) -> (&'c str, &'c str) {
-    channels.get(usize::from(index)).map_or(("", ""), |channel| (channel.name, channel.unit))
+fn channel(channels: &[Channel<'_>], index: u8) -> (String, String) {
+    channels.get(usize::from(index)).map_or_else(Default::default, |channel| (text(channel.name), text(channel.unit)))
 }
 
 fn inspected_feature(card: &Card<'_>, feature: &Feature, low: f32, high: f32) -> InspectedFeature {
@@ -268,7 +283,7 @@ fn inspected_feature(card: &Card<'_>, feature: &Feature, low: f32, high: f32) ->
         Relative::Desired(origin) => format!(" - desired {} now", channel(&signals.desired, origin).0),
         Relative::Measured(origin) => format!(" - measured {} now", channel(&signals.measured, origin).0),
     };
-    InspectedFeature { quantity: format!("{signal} {name}{origin}"), unit: unit.into(), offset: feature.offset, low, high }
+    InspectedFeature { quantity: format!("{signal} {name}{origin}"), unit, offset: feature.offset, low, high }
 }
 
 fn inspected_bounds(bounds: OutputBounds, limit: f32) -> InspectedBounds {
@@ -316,7 +331,7 @@ fn monitor(model: &Model<'_>) -> Option<InspectedMonitor> {
         let inputs = axis.inputs.iter().enumerate().map(|(place, &input)| {
             let reference = card.outputs.get(usize::from(input)).map_or(0, |output| output.channel);
             let taps = response.split_at(place * monitor.taps()).1.split_at(monitor.taps()).0;
-            (channel(&card.signals.reference, reference).0.into(), taps.iter().sum())
+            (channel(&card.signals.reference, reference).0, taps.iter().sum())
         });
         InspectedMonitorAxis { error: error(card, axis.error), inputs: inputs.collect() }
     });
@@ -325,7 +340,7 @@ fn monitor(model: &Model<'_>) -> Option<InspectedMonitor> {
         period_s,
         memory_s: period_s * monitor.taps() as f32,
         validated_rms: monitor.validated_rms(),
-        unit: channel(&card.signals.measured, first).1.into(),
+        unit: channel(&card.signals.measured, first).1,
         axes: axes.collect(),
     })
 }
@@ -337,8 +352,8 @@ fn feedback_lane(model: &Model<'_>) -> Option<InspectedLane> {
         let index = card.outputs.get(usize::from(axis.output)).map_or(0, |output| output.channel);
         let (output, unit) = channel(&card.signals.reference, index);
         InspectedAxis {
-            output: output.into(),
-            unit: unit.into(),
+            output,
+            unit,
             errors: axis.errors.iter().map(|channels| error(card, *channels)).collect(),
             integral: axis.integral,
             fast_limit: axis.fast_limit,

@@ -23,14 +23,16 @@
 //!
 //! | layer | modules | what they hold |
 //! |---|---|---|
-//! | 1 | `float_network`, `description`, `rows`, `replacement` | tensors, their meaning, rows, whole files |
-//! | 2 | `export_error`, `integer_network`, `inspection` | failures; layers in integers; a file for people |
+//! | 1 | `float_network`, `rows`, `signing` | tensors, rows; keys, signed models |
+//! | 2 | `description` | their meaning, and which network and rows belong to it |
+//! | 2 | `export_error`, `integer_network` | failures; layers in integers |
+//! | 3 | `inspection` | a file for people |
 //! | 3 | `packing` | layers in the order in which the kernels stream them |
 //! | 4 | `stored_network` | the network of a model file, unpacked |
 //! | 5 | `batch`, `bounds` | many rows at once with the bits of one; proven ranges, differences, slopes |
 //! | 6 | `quantise`, `verify` | float to integers on calibration rows; float against file over rows |
 //! | 7 | `encode` | the bytes of a model file |
-//! | 8 | `cli` | `export`, `inspect`, `verify` |
+//! | 8 | `cli` | `export`, `inspect`, `verify`, `keygen`, `sign` |
 
 pub mod batch;
 pub mod bounds;
@@ -43,8 +45,8 @@ pub mod inspection;
 pub mod integer_network;
 pub mod packing;
 pub mod quantise;
-pub mod replacement;
 pub mod rows;
+pub mod signing;
 pub mod stored_network;
 pub mod verify;
 

@@ -8,6 +8,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use impromptu_files::reading;
+
 use csv::{ReaderBuilder, StringRecord, Trim};
 
 /// Why rows were refused.
@@ -58,7 +60,7 @@ enum Reason {
 /// With file, line and column of what is wrong.
 pub fn read(path: &Path, features: usize) -> Result<Vec<Vec<f32>>, RowsError> {
     let fail = |place, reason| RowsError { path: path.to_owned(), place, reason };
-    let bytes = std::fs::read(path).map_err(|error| fail(Place::File, error.into()))?;
+    let bytes = reading::read(path, reading::TABLE).map_err(|error| fail(Place::File, error.into()))?;
     parse(&bytes, features).map_err(|(place, reason)| fail(place, reason))
 }
 

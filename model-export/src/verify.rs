@@ -3,6 +3,7 @@
 use std::fmt;
 
 use comfy_table::{Table, presets};
+use impromptu_files::text::line;
 use impromptu_firmware::model::Model;
 use serde::Serialize;
 
@@ -135,8 +136,8 @@ impl fmt::Display for Comparison {
         ]);
         for output in &self.outputs {
             table.add_row([
-                output.name.clone(),
-                output.unit.clone(),
+                line(&output.name).into_owned(),
+                line(&output.unit).into_owned(),
                 format!("{:.4e}", output.correction_rms),
                 format!("{:.3e}", output.rms),
                 format!("{:.3e}", output.largest),

@@ -38,6 +38,11 @@ static int get(void *place, size_t size)
     return fread(place, 1, size, script) == size;
 }
 
+/* The bounds that impromptu_adapter_create_quadrotor has. */
+#define POSITION {1.0f, 40.0f}
+#define VELOCITY {4.0f, 160.0f}
+static const impromptu_cap caps[6] = {POSITION, POSITION, POSITION, VELOCITY, VELOCITY, VELOCITY};
+
 /* What the library must refuse, whatever it is given. */
 static int refusals(uint32_t length)
 {
@@ -46,6 +51,9 @@ static int refusals(uint32_t length)
     int due;
     impromptu_job job;
     impromptu_report report;
+    impromptu_description description;
+    impromptu_inference inference;
+    float reference[6];
     impromptu_channel channel = {"x", "m", "world", 0};
     impromptu_signals signals = {&channel, 1, &channel, 1, &channel, 1};
     char *misaligned = (char *)&model + 1;
@@ -55,18 +63,43 @@ static int refusals(uint32_t length)
     EXPECT(impromptu_model_create((impromptu_model *)(void *)misaligned, sizeof model, bytes, length) == IMPROMPTU_STATUS_MISALIGNED);
     EXPECT(impromptu_model_create(&model, impromptu_model_size() - 1, bytes, length) == IMPROMPTU_STATUS_MEMORY);
     EXPECT(impromptu_model_create(&model, sizeof model, bytes, length - 1) == IMPROMPTU_STATUS_DAMAGED);
-    EXPECT(impromptu_adapter_create(&adapter, sizeof adapter, &model, NULL, 100.0f, 0) == IMPROMPTU_STATUS_NOT_CREATED);
+    EXPECT(impromptu_adapter_create(&adapter, sizeof adapter, &model, NULL, 100.0f, 0, caps, 6) == IMPROMPTU_STATUS_NOT_CREATED);
     DO(impromptu_model_create(&model, sizeof model, bytes, length));
-    EXPECT(impromptu_adapter_create(&adapter, sizeof adapter, &model, NULL, 99.0f, 0) == IMPROMPTU_STATUS_RATE);
-    EXPECT(impromptu_adapter_create(&adapter, sizeof adapter, &model, &signals, 100.0f, 0) == IMPROMPTU_STATUS_SIGNALS);
+    EXPECT(impromptu_adapter_create(&adapter, sizeof adapter, &model, NULL, 99.0f, 0, caps, 6) == IMPROMPTU_STATUS_RATE);
+    EXPECT(impromptu_adapter_create(&adapter, sizeof adapter, &model, &signals, 100.0f, 0, caps, 6) == IMPROMPTU_STATUS_SIGNALS);
     signals.desired_count = 17;
-    EXPECT(impromptu_adapter_create(&adapter, sizeof adapter, &model, &signals, 100.0f, 0) == IMPROMPTU_STATUS_COUNT);
+    EXPECT(impromptu_adapter_create(&adapter, sizeof adapter, &model, &signals, 100.0f, 0, caps, 6) == IMPROMPTU_STATUS_COUNT);
     signals.desired_count = 1;
     channel.name = "\xff";
-    EXPECT(impromptu_adapter_create(&adapter, sizeof adapter, &model, &signals, 100.0f, 0) == IMPROMPTU_STATUS_TEXT);
+    EXPECT(impromptu_adapter_create(&adapter, sizeof adapter, &model, &signals, 100.0f, 0, caps, 6) == IMPROMPTU_STATUS_TEXT);
     EXPECT(impromptu_adapter_switch(&adapter, 1, 1) == IMPROMPTU_STATUS_NOT_CREATED);
 
-    DO(impromptu_adapter_create(&adapter, sizeof adapter, &model, NULL, 100.0f, 0));
+    EXPECT(impromptu_adapter_create(&adapter, sizeof adapter, &model, NULL, 100.0f, 0, NULL, 6) == IMPROMPTU_STATUS_CAPS);
+    EXPECT(impromptu_adapter_create(&adapter, sizeof adapter, &model, NULL, 100.0f, 0, caps, 5) == IMPROMPTU_STATUS_CAPS);
+    EXPECT(impromptu_adapter_create(&adapter, sizeof adapter, &model, NULL, 1e30f * 1e30f, 0, caps, 6) == IMPROMPTU_STATUS_RATE);
+    DO(impromptu_adapter_create(&adapter, sizeof adapter, &model, NULL, 100.0f, 0, caps, 6));
+    /* What was there lives on after a refusal. */
+    EXPECT(impromptu_adapter_create(&adapter, sizeof adapter, &model, NULL, 99.0f, 0, caps, 6) == IMPROMPTU_STATUS_RATE);
+    DO(impromptu_adapter_report(&adapter, &report));
+    EXPECT(impromptu_model_create(&model, sizeof model, bytes, length - 1) == IMPROMPTU_STATUS_DAMAGED);
+    DO(impromptu_model_describe(&model, &description));
+    /* Nothing was pushed: the loop holds where it is. */
+    DO(impromptu_scratch_create(&scratch, sizeof scratch));
+    numbers[0] = 5.0f;
+    EXPECT(impromptu_adapter_step(&adapter, &scratch, 0, numbers, 13, reference, 6) == IMPROMPTU_STATUS_NO_TRAJECTORY);
+    EXPECT(reference[0] == 5.0f && reference[1] == 0.0f && reference[3] == 0.0f);
+    numbers[0] = 0.0f;
+    DO(impromptu_adapter_create(&adapter, sizeof adapter, &model, NULL, 100.0f, 0, caps, 6));
+    DO(impromptu_adapter_push(&adapter, numbers, 10));
+    numbers[1] = 1e30f * 1e30f;
+    EXPECT(impromptu_adapter_step(&adapter, &scratch, 0, numbers, 13, reference, 6) == IMPROMPTU_STATUS_BAD_SAMPLE);
+    EXPECT(reference[0] == 0.0f && reference[1] == 0.0f);
+    numbers[1] = 0.0f;
+    memset(&inference, 0, sizeof inference);
+    inference.outputs[0] = 1e30f * 1e30f;
+    EXPECT(impromptu_adapter_deliver(&adapter, &inference) == IMPROMPTU_STATUS_NOT_FINITE);
+    memset(&scratch, 0, sizeof scratch);
+    DO(impromptu_adapter_create(&adapter, sizeof adapter, &model, NULL, 100.0f, 0, caps, 6));
     EXPECT(impromptu_adapter_push(&adapter, numbers, 9) == IMPROMPTU_STATUS_COUNT);
     EXPECT(impromptu_adapter_push(&adapter, numbers, 17) == IMPROMPTU_STATUS_COUNT);
     EXPECT(impromptu_adapter_begin(&adapter, 0, numbers, 13, NULL, &due) == IMPROMPTU_STATUS_NULL);
@@ -177,7 +210,7 @@ static int run(void)
     DO(impromptu_scratch_create(&scratch, sizeof scratch));
     DO(impromptu_scratch_create(&other_scratch, sizeof other_scratch));
     DO(impromptu_adapter_create_quadrotor(&adapter, sizeof adapter, &model, description.reference_rate_hz, 0));
-    DO(impromptu_adapter_create(&split_adapter, sizeof split_adapter, &model, NULL, description.reference_rate_hz, 0));
+    DO(impromptu_adapter_create(&split_adapter, sizeof split_adapter, &model, NULL, description.reference_rate_hz, 0, caps, 6));
     DO(impromptu_adapter_defer(&split_adapter));
     DO(impromptu_adapter_defer(&adapter));
 

@@ -45,7 +45,7 @@ int main(void)
     static const impromptu_flight_settings settings = {
         0.03f, {1.4e-5f, 1.4e-5f, 2.9e-5f}, {{0.03f, 0.03f}, {0.03f, -0.03f}, {-0.03f, -0.03f}, {-0.03f, 0.03f}},
         {1, -1, 1, -1}, 2.3e-8f, 7.8e-10f, 2500.0f, {6, 6, 15}, {4, 4, 9}, {0, 0, 0}, 0.5f, 544.0f, 46.0f, 500.0f, 5};
-    static float measured[13], reference[6];
+    static float desired[10], measured[13], reference[6];
     static impromptu_job job;
     static impromptu_inference inference;
     static impromptu_state state = {{0, 0, 1}, {0, 0, 0}, {1, 0, 0, 0}, {0, 0, 0}, 0};
@@ -58,6 +58,7 @@ int main(void)
     MEASURE("scratch_create", impromptu_scratch_create(&scratch, sizeof scratch));
     MEASURE("adapter_create", impromptu_adapter_create_quadrotor(&adapter, sizeof adapter, &model, 100.0f, 0));
     MEASURE("adapter_switch", impromptu_adapter_switch(&adapter, 1, 1));
+    MEASURE("adapter_push", impromptu_adapter_push(&adapter, desired, 10));
     MEASURE("adapter_begin", impromptu_adapter_begin(&adapter, 0, measured, 13, &job, &due));
     MEASURE("job_run", impromptu_job_run(&job, &model, &scratch, &inference));
     MEASURE("adapter_deliver", impromptu_adapter_deliver(&adapter, &inference));

@@ -4,15 +4,18 @@
 //! whatever the bytes: that is what the fuzz target and the test on stable Rust look for.
 
 use impromptu_firmware::{
-    adapter::{Adapter, Lanes},
-    feedback::{self, Lane},
-    model::{Blob, Card, MAX_FEATURES, MAX_OUTPUTS, Model, Probes, Section, file},
-    network::Scratch,
+    Cap, Caps,
+    adapter::{Adapter, Job, Lanes},
+    feedback::{self, AxisState, Lane},
+    model::{Blob, Card, MAX_FEATURES, MAX_OUTPUTS, Model, Probes, Section, file, ranges},
+    network::{Network, Scratch},
     preview::{EndRule, Preview},
 };
 
 /// Inputs that break arithmetic which trusts them.
 const EXTREMES: [f32; 8] = [0.0, 1.0, -3.4e38, 3.4e38, 1e-40, f32::INFINITY, f32::NEG_INFINITY, f32::NAN];
+/// Bounds of an application that are wider than any model's.
+const CAPS: Caps<'_> = Caps { channels: &[Cap { limit: 1e9, rate: 1e12 }; 2], sums: &[] };
 /// Samples that the adapter's preview holds here.
 const PREVIEW: usize = 256;
 
@@ -29,24 +32,40 @@ fn load(bytes: &[u8]) -> bool {
     let Ok(model) = Model::from_bytes(bytes) else { return false };
     let _ = model.card().preview_span();
     if let Some(network) = model.network() {
-        let (mut outputs, mut scratch) = ([0.0; MAX_OUTPUTS], Scratch::new());
-        for input in EXTREMES {
-            network.evaluate(&[input; MAX_FEATURES], &mut outputs, &mut scratch);
-        }
+        let mut scratch = Scratch::new();
         let mixed: [f32; MAX_FEATURES] = core::array::from_fn(|i| EXTREMES[i % EXTREMES.len()]);
-        network.evaluate(&mixed, &mut outputs, &mut scratch);
+        for inputs in EXTREMES.map(|input| [input; MAX_FEATURES]).into_iter().chain([mixed]) {
+            let outputs = Job { tick: 0, inputs }.run(network, &mut scratch).outputs;
+            assert!(outputs.iter().all(|output| output.abs() <= ranges::MAGNITUDE), "{outputs:?}");
+        }
     }
     if let Some(lane) = model.feedback() {
-        let _ = feedback::probe(lane, 1.0 / model.card().timing.reference_rate_hz);
+        lean_on(lane, 1.0 / model.card().timing.reference_rate_hz);
     }
     fly(&model);
     true
 }
 
+/// Steps each axis of a feedback lane through extremes: its output is finite and within its clamps.
+fn lean_on(lane: &Lane<'_>, dt: f32) {
+    for axis in lane.axes() {
+        let mut state = AxisState::EMPTY;
+        let bound = axis.layout().fast_limit + axis.layout().integral_limit;
+        for tick in 0..3 * EXTREMES.len() {
+            let extreme = |shift: usize| EXTREMES[(tick * (shift + 1) + shift) % EXTREMES.len()];
+            let output = state.step(lane, axis, core::array::from_fn(extreme), 1.0, dt, true);
+            assert!(output.abs() <= bound, "{output} beyond {bound}");
+            state.applied(lane, if tick % 2 == 0 { output } else { extreme(2) });
+        }
+    }
+}
+
 /// Steps an adapter of a loop with two channels each, if the model is for one.
 fn fly(model: &Model<'_>) {
     let card = model.card();
-    let Ok(mut adapter) = Adapter::<2, 2, 2>::new(model, &card.signals, card.timing.reference_rate_hz, PREVIEW) else { return };
+    let Ok(mut adapter) = Adapter::<2, 2, 2>::new(model, &card.signals, card.timing.reference_rate_hz, &CAPS, PREVIEW) else {
+        return;
+    };
     let mut scratch = Scratch::new();
     adapter.switch(Lanes::BOTH);
     let mut preview = Preview::<2, PREVIEW>::new([EndRule::Hold; 2], 0);
@@ -72,7 +91,7 @@ fn with_header(bytes: &[u8]) -> Vec<u8> {
     sealed(repaired)
 }
 
-/// The file with no network probe and the lane probe that its lane gives, so that edited numbers get past the probes.
+/// The file with the probes that its network and its lane give, so that edited numbers get past the probes.
 fn with_probes(bytes: &[u8]) -> Option<Vec<u8>> {
     let (card, blob) = file::split(bytes).ok()?;
     let mut card: Card<'_> = postcard::from_bytes(card).ok()?;
@@ -83,13 +102,23 @@ fn with_probes(bytes: &[u8]) -> Option<Vec<u8>> {
         let outputs = feedback::probe(&lane, 1.0 / card.timing.reference_rate_hz);
         probe.extend(outputs.iter().take(layout.axes.len()).flat_map(|output| output.to_le_bytes()));
     }
-    blob.resize(blob.len().next_multiple_of(file::ALIGNMENT), 0);
-    card.probes = Probes {
-        count: 0,
-        network: Section::default(),
-        feedback: Section { offset: blob.len() as u32, length: probe.len() as u32 },
+    let mut numbers = Vec::new();
+    if let Some(layout) = &card.network {
+        let network = Network::new(layout, &Blob::new(&blob), card.features.len(), card.outputs.len()).ok()?;
+        let (inputs, mut outputs) = ([0.25; MAX_FEATURES], [0.0; MAX_OUTPUTS]);
+        network.evaluate(&inputs, &mut outputs, &mut Scratch::new());
+        // As the probes are read.
+        let outputs = outputs.map(|output: f32| if output.abs() <= ranges::MAGNITUDE { output } else { 0.0 });
+        let probe = inputs.iter().take(card.features.len()).chain(outputs.iter().take(card.outputs.len()));
+        numbers.extend(probe.flat_map(|number| number.to_le_bytes()));
+    }
+    let mut section = |bytes: Vec<u8>| {
+        blob.resize(blob.len().next_multiple_of(file::ALIGNMENT), 0);
+        let section = Section { offset: blob.len() as u32, length: bytes.len() as u32 };
+        blob.extend(bytes);
+        section
     };
-    blob.extend(probe);
+    card.probes = Probes { count: u8::from(card.network.is_some()), network: section(numbers), feedback: section(probe) };
     let card = postcard::to_allocvec(&card).ok()?;
     let mut bytes = file::header(card.len() as u32, blob.len() as u32).to_vec();
     bytes.extend(card);

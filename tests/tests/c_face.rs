@@ -8,12 +8,14 @@ use std::{
 };
 
 use impromptu_firmware::{
+    Caps,
     adapter::{Adapter, Lanes},
     model::Model,
     network::Scratch,
     preview::Preview,
 };
 use impromptu_flight::{
+    caps,
     flight::{Flight, PREVIEW},
     quadrotor::{self, DESIRED, MEASURED, REFERENCE},
     replay::{Event, HEADER, Header, RECORD},
@@ -30,6 +32,9 @@ use crate::board::{flight, model};
 /// 12 s: lanes come and go, the trajectory turns.
 const TICKS: u32 = 6_000;
 const TIMEOUT: Duration = Duration::from_secs(120);
+
+/// The bounds that the C programs give.
+const CAPS: Caps<'_> = Caps { channels: &caps::CHANNELS, sums: &[] };
 
 /// An empty folder for the test `name`.
 fn folder(name: &str) -> PathBuf {
@@ -95,7 +100,7 @@ fn script(file: &[u8]) -> (Vec<u8>, Vec<u8>) {
     let mut flight = Flight::new(&settings).unwrap();
     flight.attach(&model, Lanes::NONE).unwrap();
     let rate = settings.rates.reference_hz();
-    let mut adapter = Adapter::<DESIRED, MEASURED, REFERENCE>::new(&model, quadrotor::signals(), rate, PREVIEW).unwrap();
+    let mut adapter = Adapter::<DESIRED, MEASURED, REFERENCE>::new(&model, quadrotor::signals(), rate, &CAPS, PREVIEW).unwrap();
     adapter.defer();
     let mut preview = Preview::<DESIRED, PREVIEW>::new(quadrotor::END_RULES, 0);
     let mut scratch = Scratch::new();
@@ -150,10 +155,14 @@ fn script(file: &[u8]) -> (Vec<u8>, Vec<u8>) {
                     let reference_tick = (tick / settings.rates.position_divisor) as i32;
                     let measured = std::array::from_fn(|channel| numbers[channel]);
                     let reference = adapter.step(reference_tick, &preview, &measured, &mut scratch);
-                    floats(&mut answers, reference.iter().chain(adapter.correction()).chain(&adapter.weights()));
+                    floats(&mut answers, reference.iter().chain(&adapter.correction()).chain(&adapter.weights()));
                     answers.extend(
                         [adapter.saturations(), adapter.late(), preview.next_tick() as u32].map(u32::to_le_bytes).as_flattened(),
                     );
+                    let reach = preview.reach(reference_tick);
+                    answers.extend([adapter.starved(), reach as u32].map(u32::to_le_bytes).as_flattened());
+                    let trips = adapter.trips();
+                    answers.extend([trips.network, trips.feedback].as_flattened().iter().flat_map(|count| count.to_le_bytes()));
                 }
                 tick += 1;
             }
@@ -229,7 +238,7 @@ fn the_crazyflie_controller_corrects_setpoints_and_converts_degrees_and_pitch() 
 
     // The same line through an adapter in Rust.
     let model = Model::from_bytes(&file).unwrap();
-    let mut adapter = Adapter::<DESIRED, MEASURED, REFERENCE>::new(&model, quadrotor::signals(), 100.0, PREVIEW).unwrap();
+    let mut adapter = Adapter::<DESIRED, MEASURED, REFERENCE>::new(&model, quadrotor::signals(), 100.0, &CAPS, PREVIEW).unwrap();
     adapter.defer();
     adapter.switch(Lanes::BOTH);
     let mut preview = Preview::<DESIRED, PREVIEW>::new(quadrotor::END_RULES, 0);

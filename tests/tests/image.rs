@@ -99,6 +99,17 @@ fn both_boards_are_within_the_budget_stack_included() {
     golden::compare(GOLDEN, &text).unwrap();
 }
 
+/// Statics begin with zeros: what one begins with otherwise lies in flash too, as large as it is, be it for one number.
+#[test]
+fn flash_holds_no_image_of_a_large_static() {
+    for Image { bin, .. } in IMAGES {
+        let bytes = fs::read(build_firmware("impromptu-board", bin, BOARD, &[]).unwrap()).unwrap();
+        let elf = Elf::parse(bytes.as_slice()).unwrap();
+        let size = elf.section_by_name(".data").map_or(0, |section| section.size());
+        assert!(size <= 64, "{bin}: {size} bytes; arm-none-eabi-nm --size-sort shows which");
+    }
+}
+
 #[test]
 fn both_boards_leave_the_slots_alone() {
     for Image { bin, .. } in IMAGES {

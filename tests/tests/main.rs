@@ -6,6 +6,7 @@
 //! - [`decoder`]: mutated model files are refused or flown, never a panic;
 //! - [`elf`]: what a control tick can reach in the flashed binary: no panic, no heap; its stack, with golden memory;
 //! - [`guard`]: lanes that do harm are handed over before the error is 1.5 times the baseline's, with numbers;
+//! - [`hostile`]: whatever is desired, flown and measured: where both lanes are worse than the baseline, with a golden table;
 //! - [`emulator`]: the emulator is found, fails loudly, and counts repeatably;
 //! - [`mcu`]: what kernels cost on the microcontroller, beside other engines, with a golden table;
 //! - [`image`]: what is flashed is within its budget, leaves the models alone, and starts behind a boot loader;
@@ -27,6 +28,7 @@ mod demo;
 mod elf;
 mod emulator;
 mod guard;
+mod hostile;
 mod image;
 mod kernels;
 mod link;

@@ -122,7 +122,7 @@ fn late_inferences_are_counted_and_leave_the_baseline() {
             commands.push(command);
         }
         let adapter = flight.adapter();
-        (commands, adapter.map(|adapter| (adapter.late(), adapter.trips().of(Trip::Late), *adapter.correction())))
+        (commands, adapter.map(|adapter| (adapter.late(), adapter.trips().of(Trip::Late), adapter.correction())))
     };
     let (baseline, _) = fly(false, 0);
     let (in_time, counts) = fly(true, u32::MAX);

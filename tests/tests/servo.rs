@@ -140,6 +140,7 @@ fn model() -> Vec<u8> {
         envelope: (0..window.len()).map(bounds).collect(),
         feedback_lane: None,
         monitor: None,
+        tie: None,
     };
     encode(&description, Some(&learned.network), Precision::Int8, &calibration).unwrap()
 }

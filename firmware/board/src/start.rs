@@ -6,7 +6,7 @@ use impromptu_firmware::{
     storage::{Sequence, SlotIndex, Survey, survey},
 };
 use impromptu_flight::{application::Application, flight::Flight};
-use static_cell::ConstStaticCell;
+use static_cell::{ConstStaticCell, StaticCell};
 
 use crate::vehicle::CRAZYFLIE;
 
@@ -51,6 +51,6 @@ pub fn fits(model: &Model<'_>) -> Result<(), Refusal> {
 
 #[inline(never)]
 fn model(file: &'static [u8], scratch: &mut Scratch) -> Option<&'static Model<'static>> {
-    static MODEL: ConstStaticCell<Model<'static>> = ConstStaticCell::new(Model::EMPTY);
-    Model::load_into(MODEL.take(), file, scratch).ok()
+    static MODEL: StaticCell<Model<'static>> = StaticCell::new();
+    Model::load_into(MODEL.init_with(Model::empty), file, scratch).ok()
 }

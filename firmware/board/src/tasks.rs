@@ -90,11 +90,17 @@ impl Tasks {
         let mut piece = false;
         for byte in bytes {
             if let Some(upload) = application.on_byte(*byte) {
-                self.uploads.put(0, upload.words());
+                self.post(&upload);
                 piece = true;
             }
         }
         piece
+    }
+
+    /// Apart from the commands, which need none of its stack.
+    #[inline(never)]
+    fn post(&self, upload: &Upload) {
+        self.uploads.put(0, upload.words());
     }
 
     /// Control: flies a tick; `received` is what taking its bytes cost.
@@ -145,7 +151,9 @@ impl Tasks {
     /// Storage: stores the piece that waits.
     #[inline]
     pub fn store<S: Slot>(&self, uploader: &mut Uploader<S>, scratch: &mut Scratch) {
-        let Some(upload) = self.piece() else { return };
+        // Where it was put, not moved: it is large.
+        let piece = self.piece();
+        let Some(upload) = &piece else { return };
         let outcome = upload.carry_out(uploader, scratch, fits);
         self.outcomes.put(upload.sequence.into(), &outcome_words(&outcome));
     }

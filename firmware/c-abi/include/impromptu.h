@@ -49,12 +49,12 @@
 
 #if defined(IMPROMPTU_POINTER_64)
 // Words of 8 bytes of an impromptu_adapter.
-#define IMPROMPTU_ADAPTER_WORDS 2560
+#define IMPROMPTU_ADAPTER_WORDS 2752
 #endif
 
 #if defined(IMPROMPTU_POINTER_32)
 // Words of 8 bytes of an impromptu_adapter.
-#define IMPROMPTU_ADAPTER_WORDS 2528
+#define IMPROMPTU_ADAPTER_WORDS 2720
 #endif
 
 #if defined(IMPROMPTU_POINTER_64)
@@ -79,6 +79,9 @@
 // Most corrected channels.
 #define IMPROMPTU_MAX_OUTPUTS 8
 
+// Reasons for which the guard trips a lane.
+#define IMPROMPTU_TRIPS 8
+
 // Samples of the desired trajectory that an adapter or a flight stack keeps, past ones included.
 #define IMPROMPTU_PREVIEW 192
 
@@ -101,11 +104,11 @@ enum impromptu_status
   IMPROMPTU_STATUS_NOT_CREATED = 4,
   // A count of channels differs from the signal table's, or exceeds IMPROMPTU_MAX_CHANNELS.
   IMPROMPTU_STATUS_COUNT = 5,
-  // A number is NaN or infinite.
+  // A number is NaN, infinite, or beyond what any vehicle has or does: 10 km, 400 m/s, 1000 m/s^2, 175 rad/s.
   IMPROMPTU_STATUS_NOT_FINITE = 6,
   // A name, unit or frame is not UTF-8.
   IMPROMPTU_STATUS_TEXT = 7,
-  // The settings are impossible: a rate that is not positive, or an airframe whose rotors cannot produce every moment.
+  // The settings are impossible: a number that no vehicle has, or an airframe whose rotors cannot produce every moment.
   IMPROMPTU_STATUS_SETTINGS = 8,
   // The model has no network, or the flight stack no model.
   IMPROMPTU_STATUS_NOTHING = 9,
@@ -135,6 +138,14 @@ enum impromptu_status
   IMPROMPTU_STATUS_RATE = 27,
   // The model is refused for a reason that this version of the library cannot name.
   IMPROMPTU_STATUS_REFUSED = 28,
+  // The bounds of the correction say too little: a limit and a rate for each reference channel are needed.
+  IMPROMPTU_STATUS_CAPS = 29,
+  // A measured number is NaN or infinite: the tick was done with the last good sample.
+  IMPROMPTU_STATUS_BAD_SAMPLE = 30,
+  // There is no desired trajectory: the tick was done, the loop holds what was desired last or where it is.
+  IMPROMPTU_STATUS_NO_TRAJECTORY = 31,
+  // The preview is full: as many samples as it keeps lie ahead of the last reference tick.
+  IMPROMPTU_STATUS_FULL = 32,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -228,6 +239,14 @@ typedef struct impromptu_signals {
   uint32_t reference_count;
 } impromptu_signals;
 
+// What the correction of a reference channel may be, whatever a model says.
+typedef struct impromptu_cap {
+  // Largest absolute correction, in the channel's unit; 0: the channel is not corrected.
+  float limit;
+  // Largest rate of change of the correction, in the channel's unit a second.
+  float rate;
+} impromptu_cap;
+
 // What an adapter has done.
 typedef struct impromptu_report {
   // Correction of each output of the model in the last tick, in the channel's unit.
@@ -242,6 +261,15 @@ typedef struct impromptu_report {
   uint32_t late;
   // Reference tick of the next sample that is pushed.
   int32_t next_tick;
+  // Ticks with a lane on in which the trajectory did not reach as far ahead as impromptu_description.future: what was missing
+  // was taken as its end.
+  uint32_t starved;
+  // Samples of the trajectory ahead of the last reference tick; negative if it has ended.
+  int32_t reach;
+  // Trips of the network lane by reason: envelope, not finite, stale, saturated, counterfactual, late, oscillation, astray.
+  uint16_t network_trips[IMPROMPTU_TRIPS];
+  // Trips of the feedback lane by reason.
+  uint16_t feedback_trips[IMPROMPTU_TRIPS];
 } impromptu_report;
 
 // Memory for a flight stack.
@@ -328,9 +356,6 @@ typedef struct impromptu_command {
   struct impromptu_reference reference;
 } impromptu_command;
 
-// Every status.
-#define impromptu_status_ALL { impromptu_status_Ok, impromptu_status_Null, impromptu_status_Misaligned, impromptu_status_Memory, impromptu_status_NotCreated, impromptu_status_Count, impromptu_status_NotFinite, impromptu_status_Text, impromptu_status_Settings, impromptu_status_Nothing, impromptu_status_Damaged, impromptu_status_NotAModel, impromptu_status_Version, impromptu_status_Card, impromptu_status_Shape, impromptu_status_Value, impromptu_status_Overflow, impromptu_status_Probe, impromptu_status_Bounds, impromptu_status_Signals, impromptu_status_Preview, impromptu_status_Rate, impromptu_status_Refused, }
-
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -338,7 +363,8 @@ extern "C" {
 // A status in words, with what to do; for any number.
 const char *impromptu_status_text(int32_t status);
 
-// Checks a model file of `length` bytes and creates the model in `model`, which has `size` bytes (sizeof *model).
+// Checks a model file of `length` bytes and creates the model in `model`, which has `size` bytes (sizeof *model). A model that
+// was there before lives on if the file is refused; nothing that was created from it may be in use during the call.
 //
 // The bytes stay where they are, in flash for instance: they must live and keep unchanged as long as the model. They should
 // start at a multiple of 16 bytes; elsewhere they are read by slower kernels, with the same results. Needs up to 4 KB of stack
@@ -365,18 +391,23 @@ size_t impromptu_model_size(void);
 
 // Creates an adapter in `adapter`, which has `size` bytes, for a loop whose references run at `rate_hz`. Both lanes are off.
 //
-// `signals` is compared with the model's table, name by name; NULL takes the model's for the application's. The model must live
-// as long as the adapter. The first sample pushed will be that of reference tick `first_tick`. Needs up to 4 KB of stack.
+// `signals` is compared with the model's table, name by name; NULL takes the model's for the application's. `caps` says for each
+// reference channel, `cap_count` of them in the order of the signals, what its correction may be, whatever the model says: there
+// is no default. The model must live as long as the adapter. The first sample pushed will be that of reference tick
+// `first_tick`. Needs up to 4 KB of stack.
 impromptu_status impromptu_adapter_create(struct impromptu_adapter *adapter,
                                           size_t size,
                                           const struct impromptu_model *model,
                                           const struct impromptu_signals *signals,
                                           float rate_hz,
-                                          int32_t first_tick);
+                                          int32_t first_tick,
+                                          const struct impromptu_cap *caps,
+                                          size_t cap_count);
 
 // impromptu_adapter_create for the signals of a quadrotor, as the flight stack has them: 10 desired channels (position,
 // velocity, acceleration, yaw), 13 measured (position, velocity, roll, pitch, yaw, body rates, vertical acceleration without
-// gravity), 6 references (position, velocity). m, s, rad; world ENU, body FLU, pitch positive nose down.
+// gravity), 6 references (position, velocity). m, s, rad; world ENU, body FLU, pitch positive nose down. A correction of a
+// position is at most 1 m and 40 m/s, one of a velocity at most 4 m/s and 160 m/s^2.
 impromptu_status impromptu_adapter_create_quadrotor(struct impromptu_adapter *adapter,
                                                     size_t size,
                                                     const struct impromptu_model *model,
@@ -387,8 +418,20 @@ impromptu_status impromptu_adapter_create_quadrotor(struct impromptu_adapter *ad
 // missing is taken as the trajectory's end.
 impromptu_status impromptu_adapter_push(struct impromptu_adapter *adapter, const float *desired, size_t count);
 
-// Forgets the trajectory, for another one: the next sample pushed will be that of reference tick `first_tick`.
+// Forgets the trajectory, for another one: the next sample pushed will be that of reference tick `first_tick`. Until then the
+// loop holds what was desired last. For another trajectory on the way without a gap: impromptu_adapter_replan.
 impromptu_status impromptu_adapter_restart(struct impromptu_adapter *adapter, int32_t first_tick);
+
+// Forgets the samples of reference tick `from` and later, in whose place others will be pushed: the next one is that of
+// impromptu_report.next_tick, which is `from` unless fewer had been pushed. What lies before stays.
+impromptu_status impromptu_adapter_replan(struct impromptu_adapter *adapter, int32_t from);
+
+// Lets lanes act again that the guard has handed over for good. What is still wrong hands them over again.
+impromptu_status impromptu_adapter_rearm(struct impromptu_adapter *adapter);
+
+// Tells how many reference ticks ago the newest measurement arrived, beyond the delay that the model knows; 0 from the start.
+// Both lanes are handed over while it is older than 0.1 s.
+impromptu_status impromptu_adapter_set_age(struct impromptu_adapter *adapter, uint32_t ticks);
 
 // Switches the network lane and the feedback lane on (not 0) or off; they fade in and out over the model's fade time. With both
 // off and faded out the reference is the desired one, to the bit.
@@ -399,6 +442,10 @@ impromptu_status impromptu_adapter_switch(struct impromptu_adapter *adapter, int
 impromptu_status impromptu_adapter_defer(struct impromptu_adapter *adapter);
 
 // A whole reference tick, the network included: takes what is measured and writes the reference that the loop shall track.
+//
+// It is written, and the tick is done, also after IMPROMPTU_STATUS_BAD_SAMPLE (a measured number is NaN or infinite: it counts
+// as a missed sample, the last good one stands in) and IMPROMPTU_STATUS_NO_TRAJECTORY (nothing was pushed since creation or
+// impromptu_adapter_restart: the loop holds what was desired last or, at first, where it is).
 impromptu_status impromptu_adapter_step(struct impromptu_adapter *adapter,
                                         struct impromptu_scratch *scratch,
                                         int32_t tick,
@@ -417,10 +464,12 @@ impromptu_status impromptu_adapter_begin(struct impromptu_adapter *adapter,
                                          struct impromptu_job *job,
                                          int *due);
 
-// Takes what came of the last job; one that is not awaited any more is dropped.
+// Takes what came of the last job; one that is not awaited any more is dropped. One with a number that is not finite is refused,
+// and late.
 impromptu_status impromptu_adapter_deliver(struct impromptu_adapter *adapter, const struct impromptu_inference *inference);
 
-// Second part of a reference tick: writes the reference that the loop shall track.
+// Second part of a reference tick: writes the reference that the loop shall track. The statuses are those of
+// impromptu_adapter_step.
 impromptu_status impromptu_adapter_finish(struct impromptu_adapter *adapter,
                                           int32_t tick,
                                           const float *measured,
@@ -428,7 +477,7 @@ impromptu_status impromptu_adapter_finish(struct impromptu_adapter *adapter,
                                           float *reference,
                                           size_t reference_count);
 
-// Correction, fades, saturations and late inferences.
+// Correction, fades, saturations, late inferences, trips and how far the trajectory reaches.
 impromptu_status impromptu_adapter_report(struct impromptu_adapter *adapter, struct impromptu_report *result);
 
 // Bytes of an adapter as the library was compiled: at most sizeof(impromptu_adapter).
@@ -446,14 +495,17 @@ impromptu_status impromptu_flight_attach(struct impromptu_flight *flight,
                                          int network,
                                          int feedback);
 
-// Appends the desired state of the next reference tick, as far ahead as impromptu_description.future says.
+// Appends the desired state of the next reference tick, as far ahead as impromptu_description.future says. One that is not
+// finite, or that no vehicle can be asked for, gives IMPROMPTU_STATUS_NOT_FINITE and is not stored: the next one is still that
+// of the same tick.
 impromptu_status impromptu_flight_push(struct impromptu_flight *flight, const struct impromptu_setpoint *setpoint);
 
 // Switches the network lane and the feedback lane on (not 0) or off.
 impromptu_status impromptu_flight_switch(struct impromptu_flight *flight, int network, int feedback);
 
-// One control tick, the network included. Ticks count from 0. A state that is not finite gives IMPROMPTU_STATUS_NOT_FINITE and
-// no command: what the motors then do is the caller's decision. Needs up to 4 KB of stack.
+// One control tick, the network included. Ticks count from 0. A state that is not finite, or that no vehicle can be in, gives
+// IMPROMPTU_STATUS_NOT_FINITE, no command, and changes nothing: a missed sample. What the motors then do is the caller's
+// decision. Needs up to 4 KB of stack.
 impromptu_status impromptu_flight_step(struct impromptu_flight *flight,
                                        struct impromptu_scratch *scratch,
                                        uint32_t tick,

@@ -3,7 +3,7 @@
 //! *in* desired and measured channels, counted; *out* reference channels; *never* other bits than those of an add-on whose arrays
 //! have just these channels; *source* [`impromptu_firmware::add_on`].
 
-use impromptu_firmware::{AddOn, add_on::NotFinite};
+use impromptu_firmware::{AddOn, add_on::PushError};
 
 use crate::{
     status::Status,
@@ -31,8 +31,11 @@ pub fn counted(stage: &Stage, counts: [Option<usize>; 3]) -> Result<(), Status> 
     same.then_some(()).ok_or(Status::Count)
 }
 
-impl From<NotFinite> for Status {
-    fn from(_: NotFinite) -> Self {
-        Self::NotFinite
+impl From<PushError> for Status {
+    fn from(error: PushError) -> Self {
+        match error {
+            PushError::Full => Self::Full,
+            _ => Self::NotFinite,
+        }
     }
 }

@@ -11,7 +11,7 @@ use impromptu_firmware::{
 };
 use impromptu_flight::{
     flight::Flight,
-    types::{MotorCommand, Tick},
+    types::{self, MotorCommand, Tick},
 };
 
 use crate::{
@@ -37,10 +37,10 @@ impl Stack {
     /// Appends the desired state of the next reference tick.
     ///
     /// # Errors
-    /// If a number is not finite; then nothing is stored.
+    /// If a number is not finite, or no vehicle can be asked for it; then nothing is stored.
     pub fn push(&mut self, setpoint: &Setpoint) -> Result<(), Status> {
-        self.flight.push_setpoint(&setpoint.checked().ok_or(Status::NotFinite)?);
-        Ok(())
+        let setpoint = setpoint.checked().ok_or(Status::NotFinite)?;
+        self.flight.push_setpoint(&setpoint).then_some(()).ok_or(Status::NotFinite)
     }
 
     /// Switches lanes.
@@ -55,9 +55,9 @@ impl Stack {
     /// A control tick, the network included.
     ///
     /// # Errors
-    /// If the state is not finite; then nothing is done.
+    /// If the state is not finite, or no vehicle can be in it; then nothing is done.
     pub fn step(&mut self, tick: u32, state: &State, scratch: &mut Scratch) -> Result<Command, Status> {
-        let state = state.checked().ok_or(Status::NotFinite)?;
+        let state = state.checked().filter(types::State::is_physical).ok_or(Status::NotFinite)?;
         let command = self.flight.step(Tick(tick), &state, scratch);
         Ok(self.command(&command))
     }
@@ -65,9 +65,9 @@ impl Stack {
     /// A control tick without the network.
     ///
     /// # Errors
-    /// If the state is not finite; then nothing is done.
+    /// If the state is not finite, or no vehicle can be in it; then nothing is done.
     pub fn control(&mut self, tick: u32, state: &State) -> Result<(Command, Option<Job>), Status> {
-        let state = state.checked().ok_or(Status::NotFinite)?;
+        let state = state.checked().filter(types::State::is_physical).ok_or(Status::NotFinite)?;
         let (command, job) = self.flight.control(Tick(tick), &state);
         Ok((self.command(&command), job))
     }

@@ -15,10 +15,10 @@ pub const MODEL_WORDS: usize = 704;
 pub const MODEL_WORDS: usize = 512;
 /// Words of 8 bytes of an impromptu_adapter.
 #[cfg(target_pointer_width = "64")]
-pub const ADAPTER_WORDS: usize = 2560;
+pub const ADAPTER_WORDS: usize = 2752;
 /// Words of 8 bytes of an impromptu_adapter.
 #[cfg(target_pointer_width = "32")]
-pub const ADAPTER_WORDS: usize = 2528;
+pub const ADAPTER_WORDS: usize = 2720;
 /// Words of 8 bytes of an impromptu_flight.
 #[cfg(target_pointer_width = "64")]
 pub const FLIGHT_WORDS: usize = 2112;

@@ -24,11 +24,11 @@ pub enum Status {
     NotCreated = 4,
     /// A count of channels differs from the signal table's, or exceeds IMPROMPTU_MAX_CHANNELS.
     Count = 5,
-    /// A number is NaN or infinite.
+    /// A number is NaN, infinite, or beyond what any vehicle has or does: 10 km, 400 m/s, 1000 m/s^2, 175 rad/s.
     NotFinite = 6,
     /// A name, unit or frame is not UTF-8.
     Text = 7,
-    /// The settings are impossible: a rate that is not positive, or an airframe whose rotors cannot produce every moment.
+    /// The settings are impossible: a number that no vehicle has, or an airframe whose rotors cannot produce every moment.
     Settings = 8,
     /// The model has no network, or the flight stack no model.
     Nothing = 9,
@@ -58,11 +58,19 @@ pub enum Status {
     Rate = 27,
     /// The model is refused for a reason that this version of the library cannot name.
     Refused = 28,
+    /// The bounds of the correction say too little: a limit and a rate for each reference channel are needed.
+    Caps = 29,
+    /// A measured number is NaN or infinite: the tick was done with the last good sample.
+    BadSample = 30,
+    /// There is no desired trajectory: the tick was done, the loop holds what was desired last or where it is.
+    NoTrajectory = 31,
+    /// The preview is full: as many samples as it keeps lie ahead of the last reference tick.
+    Full = 32,
 }
 
 impl Status {
     /// Every status.
-    pub const ALL: [Self; 23] = [
+    pub(crate) const ALL: [Self; 27] = [
         Self::Ok,
         Self::Null,
         Self::Misaligned,
@@ -86,6 +94,10 @@ impl Status {
         Self::Preview,
         Self::Rate,
         Self::Refused,
+        Self::Caps,
+        Self::BadSample,
+        Self::NoTrajectory,
+        Self::Full,
     ];
 
     /// The status in words, with what to do.
@@ -97,9 +109,9 @@ impl Status {
             Self::Memory => c"the memory is too small: header and library are of different versions",
             Self::NotCreated => c"the object was not created, or is of another kind",
             Self::Count => c"a count of channels differs from the signal table's, or is too large",
-            Self::NotFinite => c"a number is NaN or infinite",
+            Self::NotFinite => c"a number is NaN, infinite, or beyond what any vehicle has or does",
             Self::Text => c"a name, unit or frame is not UTF-8",
-            Self::Settings => c"the settings are impossible: a rate, or an airframe that cannot be mixed",
+            Self::Settings => c"the settings are impossible: a number that no vehicle has, or an airframe that cannot be mixed",
             Self::Nothing => c"the model has no network, or the flight stack no model",
             Self::Damaged => c"the model file is damaged or incomplete: copy it again",
             Self::NotAModel => c"not a model file: give the file that model-export wrote",
@@ -114,6 +126,10 @@ impl Status {
             Self::Preview => c"the model looks further than the preview keeps",
             Self::Rate => c"the model was trained for another rate of the references",
             Self::Refused => c"the model is refused",
+            Self::Caps => c"bounds of the correction are missing: give each reference channel a limit and a rate",
+            Self::BadSample => c"a measured number is NaN or infinite: the last good sample stood in",
+            Self::NoTrajectory => c"there is no desired trajectory: push one; until then the loop holds",
+            Self::Full => c"the preview is full: push no further ahead",
         }
     }
 }
@@ -136,6 +152,7 @@ impl From<Refusal> for Status {
             Refusal::Signal { .. } => Self::Signals,
             Refusal::Preview { .. } => Self::Preview,
             Refusal::Rate { .. } => Self::Rate,
+            Refusal::Cap { .. } => Self::Caps,
             _ => Self::Refused,
         }
     }

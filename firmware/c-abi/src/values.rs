@@ -7,6 +7,7 @@ use core::ffi::c_char;
 
 use impromptu_firmware::{
     adapter, add_on,
+    guard::{Trip, Trips},
     model::{self, Model},
 };
 use impromptu_flight::{
@@ -20,6 +21,8 @@ pub const MAX_CHANNELS: usize = 16;
 pub const MAX_FEATURES: usize = 128;
 /// Most corrected channels.
 pub const MAX_OUTPUTS: usize = 8;
+/// Reasons for which the guard trips a lane.
+pub const TRIPS: usize = 8;
 /// Samples of the desired trajectory that an adapter or a flight stack keeps, past ones included.
 pub const PREVIEW: usize = 192;
 
@@ -28,6 +31,7 @@ const _: () = assert!(
         && MAX_FEATURES == model::MAX_FEATURES
         && MAX_OUTPUTS == model::MAX_OUTPUTS
         && PREVIEW == flight::PREVIEW
+        && TRIPS == Trip::ALL.len()
 );
 
 /// One channel of a signal. The texts must live until the adapter is created.
@@ -42,6 +46,16 @@ pub struct Channel {
     pub frame: *const c_char,
     /// Beyond the trajectory's ends: 0 the nearest sample is held (positions), 1 the channel is zero (velocities).
     pub zero_beyond: u32,
+}
+
+/// What the correction of a reference channel may be, whatever a model says.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct Cap {
+    /// Largest absolute correction, in the channel's unit; 0: the channel is not corrected.
+    pub limit: f32,
+    /// Largest rate of change of the correction, in the channel's unit a second.
+    pub rate: f32,
 }
 
 /// The application's signals, compared with the model's.
@@ -160,12 +174,44 @@ pub struct Report {
     pub late: u32,
     /// Reference tick of the next sample that is pushed.
     pub next_tick: i32,
+    /// Ticks with a lane on in which the trajectory did not reach as far ahead as impromptu_description.future: what was missing
+    /// was taken as its end.
+    pub starved: u32,
+    /// Samples of the trajectory ahead of the last reference tick; negative if it has ended.
+    pub reach: i32,
+    /// Trips of the network lane by reason: envelope, not finite, stale, saturated, counterfactual, late, oscillation, astray.
+    pub network_trips: [u16; TRIPS],
+    /// Trips of the feedback lane by reason.
+    pub feedback_trips: [u16; TRIPS],
 }
 
 impl From<add_on::Report> for Report {
     fn from(report: add_on::Report) -> Self {
-        let add_on::Report { correction, network_weight, feedback_weight, saturations, late, next_tick, .. } = report;
-        Self { correction, network_weight, feedback_weight, saturations, late, next_tick }
+        let add_on::Report {
+            correction,
+            network_weight,
+            feedback_weight,
+            saturations,
+            late,
+            next_tick,
+            starved,
+            reach,
+            trips,
+            ..
+        } = report;
+        let Trips { network: network_trips, feedback: feedback_trips } = trips;
+        Self {
+            correction,
+            network_weight,
+            feedback_weight,
+            saturations,
+            late,
+            next_tick,
+            starved,
+            reach,
+            network_trips,
+            feedback_trips,
+        }
     }
 }
 

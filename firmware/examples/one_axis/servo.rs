@@ -5,6 +5,7 @@
 //! curve) in volts.
 
 use impromptu_firmware::{
+    Cap, Caps,
     math::{abs, clamp, sin_cos},
     model::{Channel, Channels},
     preview::EndRule,
@@ -17,6 +18,9 @@ const ANGLE: Channel<'_> = Channel { name: "angle", unit: "rad", frame: "output 
 
 /// What the loop is told, what it measures, and what it tracks.
 pub(crate) const SIGNALS: Channels<'_> = Channels { desired: &[ANGLE], measured: &[ANGLE], reference: &[ANGLE] };
+
+/// What corrections may be, whatever a model says: as much as takes the whole supply, across all of it in 25 ms.
+pub(crate) const CAPS: Caps<'_> = Caps { channels: &[Cap { limit: SUPPLY / STIFFNESS, rate: 24.0 }], sums: &[] };
 
 /// The loop: volts for a rad of error, and for a rad/s of speed.
 const STIFFNESS: f32 = 20.0;

@@ -74,6 +74,17 @@ impl TxQueue {
         };
         self.outbox.truncate(waiting.saturating_add(length));
     }
+
+    // Apart from the commands, which need none of a report's stack.
+    #[inline(never)]
+    fn acknowledge(&mut self, sequence: u8, outcome: Outcome) {
+        self.send(&Report::Acknowledge { sequence, outcome });
+    }
+}
+
+#[inline(never)]
+fn introduce(tx: &mut TxQueue, autopilot: &Autopilot<'_>) {
+    tx.send(&Report::Identity(autopilot.identity(SOFTWARE)));
 }
 
 impl Default for Application<'_> {
@@ -100,28 +111,28 @@ impl<'m> Application<'m> {
         let Self { autopilot, receiver, tx, storing, .. } = self;
         let (sequence, outcome) = match receiver.push(byte)? {
             Ok(Received { sequence, order, message }) => {
-                let upload = Upload::new(sequence, &message).filter(|_| order != Order::Late);
                 let in_work = matches!(storing, Storing::Piece | Storing::Last);
-                if let Some(upload) = upload {
+                if Upload::is_made_of(&message) && order != Order::Late {
                     let reason = if autopilot.armed() {
                         Reason::Armed
                     } else if in_work {
                         Reason::Busy
                     } else {
                         if *storing == Storing::No {
-                            *storing = if upload.commits() { Storing::Last } else { Storing::Piece };
+                            *storing = if matches!(message, Command::ModelCommit) { Storing::Last } else { Storing::Piece };
                         }
-                        return Some(upload);
+                        // Made last of all: it is large, and the stack holds it once.
+                        return Upload::new(sequence, &message);
                     };
                     (sequence, Outcome::Refused(reason))
-                } else if *storing != Storing::No && message == Command::Arm && order != Order::Late {
+                } else if *storing != Storing::No && matches!(message, Command::Arm) && order != Order::Late {
                     // The core stands still while the flash is erased.
                     (sequence, Outcome::Refused(Reason::Busy))
                 } else {
-                    match autopilot.handle(&Received { sequence, order, message }) {
+                    match autopilot.carry_out(&Received { sequence, order, message }) {
                         Reaction::Silence => return None,
                         Reaction::Introduce => {
-                            tx.send(&Report::Identity(autopilot.identity(SOFTWARE)));
+                            introduce(tx, autopilot);
                             return None;
                         }
                         Reaction::Acknowledge(outcome) => (sequence, outcome),
@@ -131,7 +142,7 @@ impl<'m> Application<'m> {
             Err(Fault::Message { sequence, reason }) => (sequence, Outcome::Refused(reason)),
             Err(_) => return None,
         };
-        tx.send(&Report::Acknowledge { sequence, outcome });
+        tx.acknowledge(sequence, outcome);
         None
     }
 
@@ -141,7 +152,7 @@ impl<'m> Application<'m> {
             (Storing::Stored, _) | (Storing::Last, Outcome::Done) => Storing::Stored,
             _ => Storing::No,
         };
-        self.tx.send(&Report::Acknowledge { sequence, outcome });
+        self.tx.acknowledge(sequence, outcome);
     }
 
     /// Whether a task of lower priority has a piece of a model in work, so that the core may stand still for seconds.
@@ -168,16 +179,23 @@ impl<'m> Application<'m> {
     pub fn step(&mut self, meters: &Meters, job: &mut Job) -> (MotorCommand, bool) {
         let flew = self.autopilot.armed();
         let (command, released) = self.autopilot.step(job);
-        if flew {
-            self.tx.send(&Report::Motors(self.autopilot.motors(&command)));
+        self.report(meters, flew.then_some(&command));
+        (command, released)
+    }
+
+    // Apart from the flight, which needs none of a report's stack.
+    #[inline(never)]
+    fn report(&mut self, meters: &Meters, flown: Option<&MotorCommand>) {
+        if let Some(command) = flown {
+            self.tx.send(&Report::Motors(self.autopilot.motors(command)));
         }
         self.telemetry = self.telemetry.saturating_add(1);
         if self.telemetry >= TELEMETRY_TICKS {
             self.telemetry = 0;
             let frames = self.frames();
             self.tx.send(&Report::Telemetry(self.autopilot.telemetry(meters, frames)));
+            self.tx.send(&Report::Inputs(self.autopilot.inputs()));
         }
-        (command, released)
     }
 
     /// The bytes that wait to be sent.
@@ -194,3 +212,6 @@ impl<'m> Application<'m> {
         self.receiver.counts().report()
     }
 }
+
+#[cfg(test)]
+mod tests;

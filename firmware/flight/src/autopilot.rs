@@ -9,47 +9,42 @@
 //! | nothing for [`Timeouts::lanes_inertial_s`] | the add-on fades out |
 //! | nothing for [`Timeouts::motors_inertial_s`] | motors off, disarmed |
 //! | a state that is older than the newest | ignored |
-//! | a setpoint after a gap | filled in a straight line; if it is longer than the preview, the trajectory begins anew |
+//! | a state from the future, or one that no vehicle is in | ignored and counted: one missed sample |
+//! | states of a sender that starts again in flight | heard 20 ms (attitude) and 0.1 s (position) after the last old one |
+//! | settings that no vehicle has, or of another control rate | refused by name; nothing changes |
+//! | a setpoint after a gap, a re-plan, a brake | no jump, see the table in `autopilot/course.rs` |
 //! | a setpoint that is stored already | ignored |
+//! | a setpoint that was flown without, or of a sender that starts again | refused, with the tick that is expected |
 //! | no setpoint any more | the end of the trajectory is held |
 
+mod course;
+mod meters;
 mod state_age;
 
 use impromptu_firmware::{
     adapter::{Inference, Job, Lanes},
     guard::Trip,
-    math::sqrt,
+    math::{finite_or_zero, sqrt},
     model::{Model, Refusal},
 };
 use nalgebra::{Quaternion, UnitQuaternion, Vector4};
 
 use crate::{
-    flight::{Flight, PREVIEW},
+    flight::Flight,
     link::{
-        Command, Order, Outcome, Reason, Received,
-        message::{FrameReport, Identity, LaneReport, Motors, Telemetry, TimedSetpoint},
+        Command, Message, Order, Outcome, Reason, Received,
+        message::{FrameReport, Identity, InputReport, LaneReport, Motors, Telemetry},
     },
-    settings::{Rates, Settings},
-    types::{MotorCommand, Reference, Setpoint, State, Tick},
+    motion::MotionLimits,
+    settings::{Rates, Setting, Settings},
+    types::{MotorCommand, Reference, State, Tick},
 };
 
-use state_age::StateAge;
-pub use state_age::Timeouts;
-
-/// What a board measures of itself; the unit of costs is the board's (instructions or cycles).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Meters {
-    /// Largest cost of a control tick.
-    pub control_max: u32,
-    /// Largest cost of an inference.
-    pub inference_max: u32,
-    /// High-water mark of the stack, bytes.
-    pub stack_bytes: u32,
-    /// Largest delay from the tick's interrupt to the control task.
-    pub entry_latency_max: u32,
-    /// Control ticks that were not done when the next one was due.
-    pub deadline_misses: u32,
-}
+pub use course::RESUMES;
+use course::{Course, Now};
+pub use meters::Meters;
+use state_age::{News, StateAge};
+pub use state_age::{RUN, Timeouts};
 
 /// What is done with a command.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,10 +70,10 @@ pub struct Autopilot<'m> {
     /// Control ticks since the motors were armed.
     tick: Tick,
     armed: bool,
-    /// The newest setpoint, from which a gap is filled.
-    setpoint: Setpoint,
+    course: Course,
     /// Mean square of the tracking error over about the last second, m².
     error_square: f32,
+    refused: u32,
 }
 
 impl Default for Autopilot<'_> {
@@ -103,8 +98,9 @@ impl<'m> Autopilot<'m> {
             age: StateAge::NONE,
             tick: Tick(0),
             armed: false,
-            setpoint: Setpoint::ORIGIN,
+            course: Course::NONE,
             error_square: 0.0,
+            refused: 0,
         }
     }
 
@@ -122,17 +118,23 @@ impl<'m> Autopilot<'m> {
         Ok(())
     }
 
-    /// Gives the disarmed vehicle its settings.
+    /// Gives the disarmed vehicle its settings, all of them or none. This is the board's call: the control rate that it gives is
+    /// the one at which it calls [`Autopilot::step`], on which every time-out rests, so no message changes it.
     ///
     /// # Errors
-    /// If it is armed, if the airframe cannot be mixed, or if the model does not fit.
+    /// If it is armed, if no vehicle has these settings, or if the model does not fit. Then nothing was changed.
     pub fn configure(&mut self, settings: &Settings) -> Result<(), Reason> {
         if self.armed {
             return Err(Reason::Armed);
         }
+        settings.check().map_err(|refusal| Reason::Setting { what: refusal.what })?;
+        if let Some(model) = self.model {
+            Flight::accepts(model, &settings.rates).map_err(|refusal| Reason::Model((&refusal).into()))?;
+        }
         if !self.flight.configure(settings) {
             return Err(Reason::Settings);
         }
+        self.course.reset();
         (self.rates, self.age, self.state) = (Some(settings.rates), StateAge::new(&settings.rates), State::ORIGIN);
         match self.model {
             Some(model) if self.flight.adapter().is_none() => {
@@ -140,6 +142,20 @@ impl<'m> Autopilot<'m> {
             }
             _ => Ok(()),
         }
+    }
+
+    /// [`Autopilot::configure`] by a message.
+    fn reconfigure(&mut self, settings: &Settings) -> Result<(), Reason> {
+        if self.rates.is_none_or(|rates| rates.control_hz != settings.rates.control_hz) {
+            return Err(Reason::Setting { what: Setting::ControlRate });
+        }
+        self.configure(settings)
+    }
+
+    /// How fast the vehicle is moved by itself when it brakes and when it comes from one trajectory to another; `false`, and
+    /// nothing changes, if no vehicle can be moved so.
+    pub fn set_motion_limits(&mut self, limits: MotionLimits) -> bool {
+        self.course.limit(limits)
     }
 
     /// Whether the motors may turn.
@@ -159,28 +175,49 @@ impl<'m> Autopilot<'m> {
 
     /// Carries a command out, or does not; models are the board's affair.
     pub fn handle(&mut self, received: &Received<Command<'_>>) -> Reaction {
+        if let Err(reason) = received.message.check() {
+            self.refuse();
+            return Reaction::Acknowledge(Outcome::Refused(reason));
+        }
+        self.carry_out(received)
+    }
+
+    /// [`Autopilot::handle`] for a message that the line has checked.
+    pub(crate) fn carry_out(&mut self, received: &Received<Command<'_>>) -> Reaction {
         let outcome = match (&received.message, received.order) {
             (Command::Hello, _) => return Reaction::Introduce,
             (Command::Inertial(inertial), _) => {
-                if self.age.inertial(inertial.tick) {
-                    inertial.apply(&mut self.state);
+                match self.age.inertial(inertial.tick) {
+                    News::Newer => inertial.apply(&mut self.state),
+                    News::Older => {}
+                    News::Ahead => self.refuse(),
                 }
                 return Reaction::Silence;
             }
             (Command::Position(position), _) => {
-                if self.age.position(position.tick) {
-                    position.apply(&mut self.state);
+                match self.age.position(position.tick) {
+                    News::Newer => position.apply(&mut self.state),
+                    News::Older => {}
+                    News::Ahead => self.refuse(),
                 }
                 return Reaction::Silence;
             }
-            (Command::Setpoint(setpoint), _) => match self.follow(setpoint) {
-                Ok(()) => return Reaction::Silence,
-                Err(reason) => Err(reason),
-            },
+            (Command::Setpoint(setpoint), _) => {
+                let now = self.now();
+                match self.course.follow(&mut self.flight, &now, setpoint) {
+                    Ok(()) => return Reaction::Silence,
+                    Err(reason) => Err(reason),
+                }
+            }
             // An order that was overtaken by a younger one is out of date.
             (_, Order::Late) => return Reaction::Silence,
-            (Command::Settings(settings), _) => self.configure(settings),
+            (Command::Settings(settings), _) => self.reconfigure(settings),
             (Command::Lanes(lanes), _) => self.switch(*lanes),
+            (Command::Replan(setpoint), _) => {
+                let now = self.now();
+                self.course.replan(&mut self.flight, &now, setpoint)
+            }
+            (Command::Brake, _) => self.brake(),
             (Command::Arm, _) => self.arm(),
             (Command::Disarm, _) => {
                 self.disarm();
@@ -192,6 +229,16 @@ impl<'m> Autopilot<'m> {
             Ok(()) => Outcome::Done,
             Err(reason) => Outcome::Refused(reason),
         })
+    }
+
+    /// States that were refused since the start: from the future, or such that no vehicle is in. What the line refuses before it
+    /// comes here is in [`FrameReport::damaged`].
+    pub fn refused(&self) -> u32 {
+        self.refused
+    }
+
+    fn refuse(&mut self) {
+        self.refused = self.refused.saturating_add(1);
     }
 
     /// One control tick: what the motors get, and whether there is a job of the network for a task of lower priority.
@@ -210,7 +257,11 @@ impl<'m> Autopilot<'m> {
             // The guard counts it, and waits before the lanes come back.
             adapter.set_age(age);
         }
-        let (command, released) = self.flight.control_into(self.tick, &self.state, job);
+        if self.course.braking() {
+            let now = self.now();
+            self.course.keep_up(&mut self.flight, &now);
+        }
+        let (command, released) = self.flight.control_known(self.tick, &self.state, job);
         self.tick.0 = self.tick.0.wrapping_add(1);
         self.watch();
         (command, released)
@@ -242,13 +293,20 @@ impl<'m> Autopilot<'m> {
         Identity::new(software, model)
     }
 
+    /// What became of what it was told.
+    pub fn inputs(&self) -> InputReport {
+        let Now { tick, .. } = self.now();
+        let reach = self.flight.next_setpoint().wrapping_sub(tick).wrapping_sub(1);
+        InputReport { tick: self.tick.0, refused: self.refused, reach, braking: self.course.braking() }
+    }
+
     /// How the vehicle is.
     pub fn telemetry(&mut self, meters: &Meters, frames: FrameReport) -> Telemetry {
         let (network, feedback, late_inferences, saturations) = match self.flight.adapter() {
             Some(adapter) => {
                 let [network, feedback] = adapter.weights();
                 let lane = |weight, counts: [u16; Trip::ALL.len()]| {
-                    let mut report = LaneReport { weight, ..LaneReport::default() };
+                    let mut report = LaneReport { weight: finite_or_zero(weight), ..LaneReport::default() };
                     report.trips.iter_mut().zip(counts).for_each(|(place, count)| *place = count);
                     report
                 };
@@ -265,7 +323,7 @@ impl<'m> Autopilot<'m> {
             late_inferences,
             saturations,
             frames,
-            tracking_error: sqrt(self.error_square),
+            tracking_error: finite_or_zero(sqrt(self.error_square)),
             control_max: meters.control_max,
             inference_max: meters.inference_max,
             stack_bytes: meters.stack_bytes,
@@ -309,38 +367,26 @@ impl<'m> Autopilot<'m> {
             self.age = StateAge::new(rates);
         }
         self.flight.reset();
+        self.course.reset();
     }
 
-    /// Appends a sample of the desired trajectory, and what was lost before it.
-    fn follow(&mut self, timed: &TimedSetpoint) -> Result<(), Reason> {
-        let next = self.flight.next_setpoint();
-        let setpoint = timed.setpoint();
-        let gap = timed.tick.wrapping_sub(next);
-        if gap < 0 {
-            return Ok(());
+    /// Where the flight is on its trajectory.
+    fn now(&self) -> Now {
+        let period = self.rates.map_or(0.0, |rates| 1.0 / rates.reference_hz());
+        if !self.armed {
+            return Now { tick: 0, flown: None, period };
         }
-        // What lies further ahead than the preview would push out the present.
-        let now = self.flight.reference_tick(self.tick);
-        if timed.tick.wrapping_sub(now) >= PREVIEW as i32 || (next == 0 && gap > 0) {
-            return Err(Reason::Setpoint { expected: next });
+        let last = Tick(self.tick.0.wrapping_sub(1));
+        let flown = (self.tick.0 > 0).then(|| self.flight.reference_tick(last));
+        Now { tick: self.flight.reference_tick(self.tick), flown, period }
+    }
+
+    fn brake(&mut self) -> Result<(), Reason> {
+        if !self.armed {
+            return Err(Reason::NotArmed);
         }
-        if gap >= PREVIEW as i32 {
-            // Nothing came for so long that the trajectory begins anew.
-            self.flight.clear_setpoints(timed.tick);
-        }
-        let gap = if gap < PREVIEW as i32 { gap } else { 0 };
-        let start = self.setpoint;
-        for missing in 1..=gap {
-            let share = missing as f32 / (gap + 1) as f32;
-            self.flight.push_setpoint(&Setpoint {
-                position: start.position.lerp(&setpoint.position, share),
-                velocity: start.velocity.lerp(&setpoint.velocity, share),
-                acceleration: start.acceleration.lerp(&setpoint.acceleration, share),
-                yaw: start.yaw + (setpoint.yaw - start.yaw) * share,
-            });
-        }
-        self.flight.push_setpoint(&setpoint);
-        self.setpoint = setpoint;
+        let now = self.now();
+        self.course.brake(&mut self.flight, &now);
         Ok(())
     }
 

@@ -3,10 +3,13 @@
 //! *in* the state at every control tick and the desired trajectory ahead of time; *out* a motor command; *never* an allocation, a
 //! panic, a global, or a clock of its own; *source* the loop of Zhou 2017, Fig. 1, with the rates of [`Rates`].
 
+mod clock;
+mod frozen;
+
 use core::num::NonZeroU32;
 
 use impromptu_firmware::{
-    AddOn,
+    AddOn, Caps,
     adapter::{Adapter, Inference, Job, Lanes},
     model::{MAX_AXES, Model, Refusal},
     network::Scratch,
@@ -14,12 +17,15 @@ use impromptu_firmware::{
 use nalgebra::{Matrix3, Vector3};
 
 use crate::{
+    caps,
     control::{AttitudeLoop, Mixer, PositionLoop, ThrustVector},
     quadrotor::{self, DESIRED, MEASURED, REFERENCE},
-    types::{MotorCommand, Reference, Setpoint, State, Tick},
+    types::{MotorCommand, POSITION_LIMIT, Reference, Setpoint, State, Tick, within},
 };
 
 pub use crate::settings::{Rates, Settings};
+use clock::Clock;
+use frozen::Frozen;
 
 /// Samples of the desired trajectory that the flight stack keeps: 1.92 s at 100 Hz.
 pub const PREVIEW: usize = 192;
@@ -41,8 +47,9 @@ struct Loops {
 }
 
 impl Loops {
-    /// `None` if the airframe cannot be mixed.
+    /// `None` if no vehicle has these settings.
     fn new(settings: &Settings) -> Option<Self> {
+        settings.check().ok()?;
         Some(Self {
             rates: settings.rates,
             position_divisor: NonZeroU32::new(settings.rates.position_divisor).unwrap_or(NonZeroU32::MIN),
@@ -53,32 +60,14 @@ impl Loops {
     }
 }
 
-/// What is configured and attached. The add-on has a model exactly if this is [`Stage::Adapted`], and a model that fits these
-/// loops.
+/// What is configured and attached: with an add-on exactly if that has a model, which then fits these loops. Not an `enum` of
+/// three: to go from one to another would be to copy the loops by way of the stack.
 #[derive(Debug)]
-enum Stage {
-    /// Nothing is known of a vehicle: its motors are off.
-    Empty,
-    /// The loops alone.
-    Baseline(Loops),
-    /// The loops with the add-on before them.
-    Adapted(Loops),
-}
-
-impl Stage {
-    fn loops(&self) -> Option<&Loops> {
-        match self {
-            Self::Empty => None,
-            Self::Baseline(loops) | Self::Adapted(loops) => Some(loops),
-        }
-    }
-
-    fn loops_mut(&mut self) -> Option<&mut Loops> {
-        match self {
-            Self::Empty => None,
-            Self::Baseline(loops) | Self::Adapted(loops) => Some(loops),
-        }
-    }
+struct Stage {
+    /// `None`: nothing is known of a vehicle, and its motors are off.
+    loops: Option<Loops>,
+    /// The loops have the add-on before them.
+    adapted: bool,
 }
 
 /// The baseline loop with, if a model is attached, the add-on before it.
@@ -89,6 +78,10 @@ pub struct Flight<'m> {
     wanted: ThrustVector,
     reference: Reference,
     dither: Vector3<f32>,
+    clock: Clock,
+    /// The newest state that a vehicle can be in.
+    state: Option<State>,
+    frozen: Frozen,
 }
 
 impl<'m> Flight<'m> {
@@ -96,7 +89,7 @@ impl<'m> Flight<'m> {
     /// a static and [configures](Flight::configure) it there.
     pub const fn empty() -> Self {
         Self {
-            stage: Stage::Empty,
+            stage: Stage { loops: None, adapted: false },
             add_on: QuadrotorAddOn::empty(),
             wanted: ThrustVector {
                 force: Vector3::new(0.0, 0.0, 0.0),
@@ -104,24 +97,29 @@ impl<'m> Flight<'m> {
             },
             reference: Reference::ORIGIN,
             dither: Vector3::new(0.0, 0.0, 0.0),
+            clock: Clock::EMPTY,
+            state: None,
+            frozen: Frozen::EMPTY,
         }
     }
 
-    /// A flight stack on the ground; `None` if the airframe cannot be mixed. The first setpoint is that of reference tick 0.
+    /// A flight stack on the ground; `None` if no vehicle has these settings ([`Settings::check`] says why). The first setpoint
+    /// is that of reference tick 0.
     pub fn new(settings: &Settings) -> Option<Self> {
         let mut flight = Self::empty();
         flight.configure(settings).then_some(flight)
     }
 
-    /// Back on the ground with these settings; `false`, and nothing changes, if the airframe cannot be mixed. An add-on stays, as
-    /// it was when it was attached but with its lanes off, if its model is for these settings; else it is detached.
+    /// Back on the ground with these settings; `false`, and nothing changes, if no vehicle has them ([`Settings::check`] says
+    /// why). An add-on stays, as it was when it was attached but with its lanes off, if its model is for these settings; else it
+    /// is detached.
     pub fn configure(&mut self, settings: &Settings) -> bool {
         let Some(loops) = Loops::new(settings) else { return false };
-        if self.add_on.model().is_some_and(|model| Self::accepts(model, &settings.rates).is_ok()) {
-            self.stage = Stage::Adapted(loops);
+        self.stage.loops = Some(loops);
+        self.stage.adapted = self.add_on.model().is_some_and(|model| Self::accepts(model, &settings.rates).is_ok());
+        if self.stage.adapted {
             self.add_on.restart(0);
         } else {
-            self.stage = Stage::Baseline(loops);
             let _ = self.add_on.bypass(quadrotor::signals());
         }
         self.reset();
@@ -131,11 +129,12 @@ impl<'m> Flight<'m> {
     /// Back on the ground: the next setpoint is that of reference tick 0, and nothing is left of the last flight but the lanes
     /// that are wanted and the counts.
     pub fn reset(&mut self) {
-        if let Some(loops) = self.stage.loops_mut() {
+        if let Some(loops) = &mut self.stage.loops {
             loops.position.reset();
         }
         self.add_on.reset(0);
         (self.wanted, self.reference, self.dither) = (ThrustVector::NONE, Reference::ORIGIN, Vector3::zeros());
+        (self.clock, self.state, self.frozen) = (Clock::EMPTY, None, Frozen::EMPTY);
     }
 
     /// Puts an add-on before the configured loops, with the lanes given, in the place of the one that was there. The trajectory
@@ -145,16 +144,21 @@ impl<'m> Flight<'m> {
     /// If the model is for other signals, another rate, or a longer preview; what was attached then stays. A flight stack without
     /// settings has a rate of 0.
     pub fn attach(&mut self, model: &'m Model<'m>, lanes: Lanes) -> Result<(), Refusal> {
-        Self::accepts(model, &self.stage.loops().map_or(Rates::NONE, |loops| loops.rates))?;
+        Self::accepts(model, &self.stage.loops.as_ref().map_or(Rates::NONE, |loops| loops.rates))?;
+        self.place(model);
         let (adapter, _) = self.add_on.parts();
-        adapter.load(model, &quadrotor::signals());
         adapter.defer();
         adapter.switch(lanes);
-        self.stage = match core::mem::replace(&mut self.stage, Stage::Empty) {
-            Stage::Empty => Stage::Empty,
-            Stage::Baseline(loops) | Stage::Adapted(loops) => Stage::Adapted(loops),
-        };
+        self.stage.adapted = self.stage.loops.is_some();
         Ok(())
+    }
+
+    /// Gives the adapter an accepted model, apart from the check, which needs none of its stack.
+    #[inline(never)]
+    fn place(&mut self, model: &'m Model<'m>) {
+        let sums = self.stage.loops.as_ref().map(|loops| caps::sums(loops.position.gains()));
+        let caps = Caps { channels: &caps::CHANNELS, sums: sums.as_ref().map_or(&[], |sums| sums) };
+        self.add_on.parts().0.load(model, &quadrotor::signals(), &caps);
     }
 
     /// Takes the add-on away: the loops fly alone. The trajectory stays.
@@ -162,10 +166,7 @@ impl<'m> Flight<'m> {
         let (adapter, _) = self.add_on.parts();
         // The table's references all have the names of desired channels.
         let _ = adapter.bypass(&quadrotor::signals());
-        self.stage = match core::mem::replace(&mut self.stage, Stage::Empty) {
-            Stage::Empty => Stage::Empty,
-            Stage::Baseline(loops) | Stage::Adapted(loops) => Stage::Baseline(loops),
-        };
+        self.stage.adapted = false;
     }
 
     /// Whether [`Flight::attach`] takes a model, once configured with these rates.
@@ -174,20 +175,23 @@ impl<'m> Flight<'m> {
     /// As [`Flight::attach`].
     #[inline(never)]
     pub fn accepts(model: &Model<'_>, rates: &Rates) -> Result<(), Refusal> {
-        QuadrotorAddOn::check(model, quadrotor::signals(), rates.reference_hz())
+        let caps = Caps { channels: &caps::CHANNELS, sums: &[] };
+        QuadrotorAddOn::check(model, quadrotor::signals(), rates.reference_hz(), &caps)
     }
 
     /// The add-on, if there is one.
     pub fn adapter(&mut self) -> Option<&mut QuadrotorAdapter<'m>> {
-        match self.stage {
-            Stage::Adapted(_) => Some(self.add_on.parts().0),
-            Stage::Empty | Stage::Baseline(_) => None,
-        }
+        self.stage.adapted.then(|| self.add_on.parts().0)
     }
 
-    /// Appends the desired state of the next reference tick.
-    pub fn push_setpoint(&mut self, setpoint: &Setpoint) {
-        self.add_on.parts().1.push(quadrotor::desired(setpoint));
+    /// Appends the desired state of the next reference tick; `false`, and nothing changes, if no vehicle can be asked for it
+    /// ([`Setpoint::is_physical`]): the next one is still that of the same tick.
+    pub fn push_setpoint(&mut self, setpoint: &Setpoint) -> bool {
+        let physical = setpoint.is_physical();
+        if physical {
+            self.add_on.parts().1.push(quadrotor::desired(setpoint));
+        }
+        physical
     }
 
     /// Reference tick of the next [`Flight::push_setpoint`].
@@ -205,10 +209,22 @@ impl<'m> Flight<'m> {
         self.add_on.clear(tick);
     }
 
+    /// The desired state at a reference tick; beyond the trajectory's ends at rest there.
+    pub fn setpoint(&self, tick: i32) -> Setpoint {
+        let [px, py, pz, vx, vy, vz, ax, ay, az, yaw] = self.add_on.desired(tick);
+        let vector = Vector3::new;
+        Setpoint { position: vector(px, py, pz), velocity: vector(vx, vy, vz), acceleration: vector(ax, ay, az), yaw }
+    }
+
+    /// Forgets the desired trajectory from a reference tick on, of which the next setpoint then is. What is before it stays.
+    pub fn replace_setpoints(&mut self, from: i32) {
+        self.add_on.truncate(from);
+    }
+
     /// Reference tick of a control tick.
     pub fn reference_tick(&self, tick: Tick) -> i32 {
-        let divisor = self.stage.loops().map_or(NonZeroU32::MIN, |loops| loops.position_divisor);
-        (tick.0 / divisor) as i32
+        let divisor = self.stage.loops.as_ref().map_or(NonZeroU32::MIN, |loops| loops.position_divisor);
+        self.clock.at(tick.0, divisor).reference
     }
 
     /// Where the vehicle is desired to be at a control tick, m, world ENU; of the position loop's last tick.
@@ -218,17 +234,20 @@ impl<'m> Flight<'m> {
     }
 
     /// Adds an offset, m, world ENU, to the position reference from the next reference tick on: the independent dither without
-    /// which the closed loop cannot be identified. Zero leaves every bit as it is.
+    /// which the closed loop cannot be identified. Zero leaves every bit as it is. One that is further than any vehicle flies
+    /// changes nothing.
     pub fn set_dither(&mut self, offset: Vector3<f32>) {
-        self.dither = offset;
+        if within(offset.as_slice(), POSITION_LIMIT) {
+            self.dither = offset;
+        }
     }
 
-    /// One control tick, the network included.
+    /// One control tick, the network included. A state that no vehicle can be in ([`State::is_physical`]) is a missed sample: the
+    /// one before it stays, and until there has been one the motors are off.
     pub fn step<const S: usize>(&mut self, tick: Tick, state: &State, scratch: &mut Scratch<S>) -> MotorCommand {
-        let (command, job) = self.control(tick, state);
-        if let Some(job) = job
-            && let Some(network) = self.add_on.model().and_then(Model::network)
-        {
+        let mut job = Job::EMPTY;
+        let (command, released) = self.control_into(tick, state, &mut job);
+        if released && let Some(network) = self.add_on.model().and_then(Model::network) {
             self.deliver(job.run(network, scratch));
         }
         command
@@ -244,11 +263,26 @@ impl<'m> Flight<'m> {
 
     /// [`Flight::control`] that puts the job, if there is one, where the caller has room for it: `true`.
     pub fn control_into(&mut self, tick: Tick, state: &State, job: &mut Job) -> (MotorCommand, bool) {
-        let (wanted, released) = self.position_step(tick, state, job, |_| ());
+        let Some(state) = self.known(state) else { return (MotorCommand::OFF, false) };
+        self.control_known(tick, &state, job)
+    }
+
+    /// [`Flight::control_into`] for a state that was checked. What else a tick does needs none of its stack.
+    #[inline(never)]
+    pub(crate) fn control_known(&mut self, tick: Tick, state: &State, job: &mut Job) -> (MotorCommand, bool) {
+        let (wanted, released) = self.position_part(tick, state, job, |_| ());
         if let Some(wanted) = wanted {
             self.wanted = wanted;
         }
-        (self.attitude_step(&self.wanted, state), released)
+        (self.attitude_part(&self.wanted, state), released)
+    }
+
+    /// The state, or, if no vehicle can be in it, the last one that a vehicle can be in.
+    fn known(&mut self, state: &State) -> Option<State> {
+        if state.is_physical() {
+            self.state = Some(*state);
+        }
+        self.state
     }
 
     /// The first half of a control tick: at a reference tick what the position loop wants of the attitude loop, and whether `job`
@@ -262,17 +296,25 @@ impl<'m> Flight<'m> {
         job: &mut Job,
         path: impl FnOnce(&mut [f32; MAX_AXES]),
     ) -> (Option<ThrustVector>, bool) {
-        let (loops, corrected) = match &mut self.stage {
-            Stage::Empty => return (None, false),
-            Stage::Baseline(loops) => (loops, false),
-            Stage::Adapted(loops) => (loops, true),
-        };
-        if !tick.0.is_multiple_of(loops.position_divisor.get()) {
+        let Some(state) = self.known(state) else { return (None, false) };
+        self.position_part(tick, &state, job, path)
+    }
+
+    fn position_part(
+        &mut self,
+        tick: Tick,
+        state: &State,
+        job: &mut Job,
+        path: impl FnOnce(&mut [f32; MAX_AXES]),
+    ) -> (Option<ThrustVector>, bool) {
+        let Stage { loops: Some(loops), adapted: corrected } = &mut self.stage else { return (None, false) };
+        self.clock = self.clock.at(tick.0, loops.position_divisor);
+        if self.clock.phase != 0 {
             return (None, false);
         }
-        let reference_tick = (tick.0 / loops.position_divisor) as i32;
-        let (reference, released) = if corrected {
-            adapted(&mut self.add_on, reference_tick, state, job, path)
+        let reference_tick = self.clock.reference;
+        let (reference, released) = if *corrected {
+            adapted(&mut self.add_on, &mut self.frozen, reference_tick, state, job, path)
         } else {
             (desired(&self.add_on, reference_tick), false)
         };
@@ -285,7 +327,14 @@ impl<'m> Flight<'m> {
 
     /// The second half of a control tick: what the motors get for what the position loop wants.
     pub fn attitude_step(&self, wanted: &ThrustVector, state: &State) -> MotorCommand {
-        let Some(loops) = self.stage.loops() else { return MotorCommand::OFF };
+        match if state.is_physical() { Some(state) } else { self.state.as_ref() } {
+            Some(state) => self.attitude_part(wanted, state),
+            None => MotorCommand::OFF,
+        }
+    }
+
+    fn attitude_part(&self, wanted: &ThrustVector, state: &State) -> MotorCommand {
+        let Some(loops) = self.stage.loops.as_ref() else { return MotorCommand::OFF };
         let (thrust, moment) = loops.attitude.step(wanted, state);
         loops.mixer.mix(thrust, &moment)
     }
@@ -299,6 +348,7 @@ impl<'m> Flight<'m> {
 /// The corrected reference at a reference tick, and whether the network has a job.
 fn adapted(
     add_on: &mut QuadrotorAddOn<'_>,
+    frozen: &mut Frozen,
     tick: i32,
     state: &State,
     job: &mut Job,
@@ -306,9 +356,10 @@ fn adapted(
 ) -> (Reference, bool) {
     let measured = quadrotor::measured(state);
     let (adapter, preview) = add_on.parts();
+    adapter.set_standing(frozen.ticks(state, &preview.sample(tick), adapter.rate_hz()));
     let released = adapter.begin_into(tick, preview, &measured, job);
     let reference = adapter.finish_through(tick, preview, &measured, path);
-    let [.., yaw] = preview.sample(tick);
+    let yaw = preview.channel(tick, DESIRED - 1);
     (quadrotor::reference(&reference, yaw), released)
 }
 
@@ -317,3 +368,6 @@ fn desired(add_on: &QuadrotorAddOn<'_>, tick: i32) -> Reference {
     let [px, py, pz, vx, vy, vz, .., yaw] = add_on.desired(tick);
     quadrotor::reference(&[px, py, pz, vx, vy, vz], yaw)
 }
+
+#[cfg(test)]
+mod tests;

@@ -22,7 +22,9 @@
 //! |--:|---|---|
 //! | 1 | `types` | states, setpoints, references, motor commands |
 //! | 2 | `control` | the baseline loop: position loop, attitude loop, mixer |
+//! | 2 | `motion` | from one motion into another: braking, blending |
 //! | 2 | `quadrotor` | which channels a quadrotor's models map between |
+//! | 3 | `caps` | what corrections of a quadrotor's references may be |
 //! | 3 | `settings` | vehicle constants, gains and rates |
 //! | 4 | `flight` | the baseline loop with the add-on before it |
 //! | 4 | `link` | messages as bytes which may be lost, damaged or delayed |
@@ -37,9 +39,11 @@
 
 pub mod application;
 pub mod autopilot;
+pub mod caps;
 pub mod control;
 pub mod flight;
 pub mod link;
+pub mod motion;
 pub mod quadrotor;
 pub mod replay;
 pub mod settings;
@@ -47,5 +51,5 @@ pub mod types;
 
 pub use application::Application;
 pub use flight::{Flight, QuadrotorAdapter};
-pub use settings::{Rates, Settings};
+pub use settings::{Rates, Setting, Settings, SettingsRefusal};
 pub use types::{MotorCommand, Reference, Setpoint, State, Tick};

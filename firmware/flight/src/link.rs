@@ -14,6 +14,12 @@
 //! The sequence counts the sender's frames modulo 256. What lies between two zeros is a frame or nothing, so whatever happens the
 //! receiver is in step again at the next zero. Version 1 is frozen: `link/frozen.rs` holds the exact bytes of every message.
 //! Messages and reasons may be added behind the last one; everything else makes another version.
+//!
+//! # Trust
+//! The check sum finds damage, not malice: whoever can write to the line flies the vehicle, and a recording that is said again
+//! to a disarmed vehicle is a host like any other. So the line is a wire, and what bridges it to a radio has to know who
+//! speaks. What holds for any speaker: no message turns a time-out off, changes the control rate, or makes a number of the loop
+//! one that no vehicle has; while armed no setting, no second arming and no setpoint of the past is taken.
 
 pub mod message;
 pub mod outcome;
@@ -33,7 +39,7 @@ use crc::{CRC_32_ISO_HDLC, Crc, Table};
 
 pub use counts::{Counts, Fault};
 pub use message::{Command, Commands, Direction, Message, Report, Reports};
-pub use outcome::{ModelFault, Outcome, Reason};
+pub use outcome::{ModelFault, Outcome, Quantity, Reason};
 pub use port::{SendError, receive, send};
 pub use receiver::{Order, RECENT, Received, Receiver};
 pub use sender::{Sender, encode};

@@ -1,10 +1,30 @@
 //! Values that cross the boundary of the flight stack.
 //!
 //! *in/out* plain values in SI units, world ENU, body FLU; *never* a motor command outside 0..1 or non-finite;
-//! *source* conventions of the crate root.
+//! *source* conventions of the crate root; the limits below are far beyond what any multirotor does, and far within what f32
+//! computes with.
 
-use impromptu_firmware::math::{clamp, finite_or_zero};
+use impromptu_firmware::math::{abs, clamp, finite_or_zero};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
+
+/// Largest coordinate of a position, m: beyond the range of any multirotor from where it took off.
+pub const POSITION_LIMIT: f32 = 10_000.0;
+/// Largest component of a velocity, m/s: twice the fastest multirotor.
+pub const VELOCITY_LIMIT: f32 = 400.0;
+/// Largest component of an acceleration, m/s²: 100 g, six times what the sensors of flight controllers measure (16 g).
+pub const ACCELERATION_LIMIT: f32 = 1_000.0;
+/// Largest body rate, rad/s: five times what the gyroscopes of flight controllers measure (2000 °/s).
+pub const RATE_LIMIT: f32 = 175.0;
+/// Largest yaw, rad, of whoever counts turns: as far as its sine is exact
+/// ([`impromptu_firmware::math::sin_cos`]).
+pub const YAW_LIMIT: f32 = 8_192.0;
+/// How far from 1 the squared length of an attitude's quaternion may be: rounding, and what the link lets pass.
+pub const ATTITUDE_TOLERANCE: f32 = 3e-3;
+
+/// Whether each number is at most `limit` away from 0; NaN is not.
+pub(crate) fn within(values: &[f32], limit: f32) -> bool {
+    values.iter().all(|value| abs(*value) <= limit)
+}
 
 /// Count of control ticks (500 Hz by default) since the stack started.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -40,6 +60,17 @@ impl State {
         rates: Vector3::new(0.0, 0.0, 0.0),
         vertical_acceleration: 0.0,
     };
+
+    /// Whether a vehicle can be there and so: every number within the limits above, the attitude's length 1. What is not so is
+    /// no measurement, whatever it is.
+    pub fn is_physical(&self) -> bool {
+        let q = &self.attitude.coords;
+        within(self.position.as_slice(), POSITION_LIMIT)
+            && within(self.velocity.as_slice(), VELOCITY_LIMIT)
+            && within(self.rates.as_slice(), RATE_LIMIT)
+            && abs(self.vertical_acceleration) <= ACCELERATION_LIMIT
+            && abs(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w - 1.0) <= ATTITUDE_TOLERANCE
+    }
 
     /// Builds a state from raw numbers; `attitude` is `[w, x, y, z]` and is normalised here.
     /// `None` if any number is not finite or the quaternion is near zero.
@@ -78,6 +109,14 @@ impl Setpoint {
         let zero = Vector3::new(0.0, 0.0, 0.0);
         Self { position: zero, velocity: zero, acceleration: zero, yaw: 0.0 }
     };
+
+    /// Whether a vehicle can be asked for it: every number within the limits above.
+    pub fn is_physical(&self) -> bool {
+        within(self.position.as_slice(), POSITION_LIMIT)
+            && within(self.velocity.as_slice(), VELOCITY_LIMIT)
+            && within(self.acceleration.as_slice(), ACCELERATION_LIMIT)
+            && abs(self.yaw) <= YAW_LIMIT
+    }
 }
 
 /// What the baseline loop tracks: the desired state, corrected.
@@ -125,6 +164,26 @@ mod tests {
         fn motor_commands_are_always_fractions(bits in any::<[u32; 4]>()) {
             let command = MotorCommand::saturated(bits.map(f32::from_bits));
             prop_assert!(command.fractions().iter().all(|f| (0.0..=1.0).contains(f)));
+        }
+
+        #[test]
+        fn what_is_physical_is_within_every_limit(index in 0usize..14, bits in any::<u32>()) {
+            let mut raw = [0.1f32; 14];
+            raw[index] = f32::from_bits(bits);
+            let part = |from: usize| Vector3::new(raw[from], raw[from + 1], raw[from + 2]);
+            let limits = [[POSITION_LIMIT; 3], [VELOCITY_LIMIT; 3], [RATE_LIMIT; 3]];
+            let expected = limits.as_flattened().iter().chain(&[ACCELERATION_LIMIT]).zip(raw).all(|(l, x)| x.abs() <= *l);
+            let (position, velocity, rates) = (part(0), part(3), part(6));
+            let state = State { position, velocity, rates, vertical_acceleration: raw[9], ..State::ORIGIN };
+            prop_assert_eq!(state.is_physical(), expected);
+            let turned = Quaternion::from_vector(Vector4::new(0.0, 0.0, 0.0, raw[index]));
+            let state = State { attitude: UnitQuaternion::new_unchecked(turned), ..State::ORIGIN };
+            prop_assert!(!state.is_physical() || (raw[index].abs() - 1.0).abs() < 2e-3);
+            let setpoint = Setpoint { position, velocity, acceleration: part(10), yaw: raw[13] };
+            let limits = [[POSITION_LIMIT; 3], [VELOCITY_LIMIT; 3]];
+            let mut others = raw[10..13].iter().map(|x| (x, ACCELERATION_LIMIT)).chain([(&raw[13], YAW_LIMIT)]);
+            let expected = limits.as_flattened().iter().zip(raw).all(|(l, x)| x.abs() <= *l) && others.all(|(x, l)| x.abs() <= l);
+            prop_assert_eq!(setpoint.is_physical(), expected);
         }
 
         #[test]

@@ -1,9 +1,10 @@
-//! Both lanes added, within the model's limits and slew.
+//! Both lanes added, within the application's bounds and the model's limits and slew.
 //!
 //! *in* what each lane wants and how far it is faded in; *out* the correction, and what each lane has of it; *never* more than an
-//! output's limit, nor more than its slew from one tick to the next.
+//! output's limit, nor more than its slew from one tick to the next, also where models change: what one left goes by its slew.
 
 use crate::{
+    caps::Bounds,
     format::{Card, MAX_AXES, MAX_OUTPUTS},
     guard::{Outcome, Shares},
     math::clamp,
@@ -22,18 +23,35 @@ pub(super) struct Wanted {
 
 /// The correction of the last tick.
 #[derive(Debug)]
-pub(super) struct Correction {
-    pub(super) values: [f32; MAX_OUTPUTS],
+pub(super) struct Correction<const R: usize> {
+    /// Of each reference channel, in its unit.
+    values: [f32; R],
+    /// Largest change of each in a tick, as it was when the channel was last corrected.
+    slews: [f32; R],
     pub(super) saturations: u32,
 }
 
-impl Correction {
+impl<const R: usize> Correction<R> {
     /// None.
-    pub(super) const NONE: Self = Self { values: [0.0; MAX_OUTPUTS], saturations: 0 };
+    pub(super) const NONE: Self = Self { values: [0.0; R], slews: [0.0; R], saturations: 0 };
 
     /// Whether a correction is left. The slew may need longer than the fade.
     pub(super) fn left(&self) -> bool {
         self.values.iter().any(|value| *value != 0.0)
+    }
+
+    /// The correction of each output of a model, in its channel's unit.
+    pub(super) fn of_outputs(&self, card: &Card<'_>) -> [f32; MAX_OUTPUTS] {
+        let mut values = [0.0; MAX_OUTPUTS];
+        for (value, output) in values.iter_mut().zip(&card.outputs) {
+            *value = self.values.get(usize::from(output.channel)).copied().unwrap_or(0.0);
+        }
+        values
+    }
+
+    /// None at once: for a loop at rest.
+    pub(super) fn reset(&mut self) {
+        self.values = [0.0; R];
     }
 
     /// Adds the lanes to `reference`, within limits and slew; the feedback lane's part by way of `path`. Returns what each axis
@@ -41,9 +59,10 @@ impl Correction {
     pub(super) fn apply(
         &mut self,
         card: &Card<'_>,
+        bounds: &Bounds<R>,
         wanted: &Wanted,
         path: impl FnOnce(&mut [f32; MAX_AXES]),
-        reference: &mut [f32],
+        reference: &mut [f32; R],
         outcome: &mut Outcome,
     ) -> [f32; MAX_AXES] {
         let mut asked = wanted.feedback.map(|value| value * wanted.feedback_weight);
@@ -56,26 +75,37 @@ impl Correction {
             }
         }
         shadow(card, &wanted.network, outcome);
+        let lanes = wanted.network.iter().zip(&feedback);
+        // What is no output of this model was one of another: it goes.
+        let mut targets = [0.0; R];
+        for (output, (network, feedback)) in card.outputs.iter().zip(lanes.clone()) {
+            let channel = usize::from(output.channel);
+            let (limit, most) = bounds.channel(channel);
+            let limit = least(output.limit, limit);
+            if let (Some(target), Some(slew)) = (targets.get_mut(channel), self.slews.get_mut(channel)) {
+                *slew = least(output.slew, most);
+                *target = clamp(network * wanted.network_weight + feedback.unwrap_or(0.0), -limit, limit);
+            }
+        }
+        self.approach(&targets, bounds);
+        for (channel, value) in reference.iter_mut().zip(&self.values) {
+            // Not even an addition of zero: the baseline's bits.
+            if *value != 0.0 {
+                *channel += *value;
+            }
+        }
         let Outcome { shares, excess, .. } = outcome;
         let mut lost = [0.0; MAX_OUTPUTS];
         let parts = shares.network.iter_mut().zip(&mut shares.feedback).zip(&mut lost);
-        let lanes = wanted.network.iter().zip(&feedback);
         let mut saturated = false;
-        for (((output, value), ((network_part, feedback_part), lost)), (network, feedback)) in
-            card.outputs.iter().zip(&mut self.values).zip(parts).zip(lanes)
-        {
+        for ((output, ((network_part, feedback_part), lost)), (network, feedback)) in card.outputs.iter().zip(parts).zip(lanes) {
+            let value = self.values.get(usize::from(output.channel)).copied().unwrap_or(0.0);
             let network = network * wanted.network_weight;
-            let sum = network + feedback.unwrap_or(0.0);
-            let slewed = clamp(sum, *value - output.slew, *value + output.slew);
-            *value = clamp(slewed, -output.limit, output.limit);
-            *lost = *value - sum;
-            if let Some(channel) = reference.get_mut(usize::from(output.channel)) {
-                *channel += *value;
-            }
+            *lost = value - (network + feedback.unwrap_or(0.0));
             // What the bounds take is the feedback lane's loss, which knows what to do about it.
             let shared = feedback.is_some() && wanted.feedback_weight > 0.0;
-            *network_part = if shared { clamp(network, -output.limit, output.limit) } else { *value };
-            *feedback_part = *value - *network_part;
+            *network_part = if shared { clamp(network, -output.limit, output.limit) } else { value };
+            *feedback_part = value - *network_part;
             if *lost != 0.0 {
                 saturated = true;
                 // A limit of zero switches the output off.
@@ -91,12 +121,35 @@ impl Correction {
         applied
     }
 
+    /// Goes towards targets that are within the channels' limits, by their slew, and within what is bounded together.
+    fn approach(&mut self, targets: &[f32; R], bounds: &Bounds<R>) {
+        let last = self.values;
+        for ((value, target), slew) in self.values.iter_mut().zip(targets).zip(&self.slews) {
+            *value = clamp(*target, *value - slew, *value + slew);
+        }
+        bounds.bound_sums(&last, &mut self.values, &self.slews);
+    }
+
+    /// Adds what is left of a correction that no model asks for any more; by its slew it goes.
+    pub(super) fn fade(&mut self, bounds: &Bounds<R>, reference: &mut [f32; R]) {
+        self.approach(&[0.0; R], bounds);
+        for (channel, value) in reference.iter_mut().zip(&self.values) {
+            if *value != 0.0 {
+                *channel += *value;
+            }
+        }
+    }
+
     /// No correction; not even an addition of zero: the baseline's bits.
     pub(super) fn clear(&mut self, card: &Card<'_>, wanted: &Wanted, outcome: &mut Outcome) -> [f32; MAX_AXES] {
-        self.values = [0.0; MAX_OUTPUTS];
+        self.values = [0.0; R];
         shadow(card, &wanted.network, outcome);
         [0.0; MAX_AXES]
     }
+}
+
+fn least(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }
 
 /// An outcome in which nothing was applied, with what the network lane would do without the other.

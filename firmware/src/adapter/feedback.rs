@@ -3,10 +3,10 @@
 //! *in* measured channels, desired ones at the time of the measurement; *out* errors, and what the lane wants on each of its
 //! axes; *never* more than its clamps, which [`crate::feedback`] keeps.
 
-use super::signals::matched_error;
+use super::signals::{matched_desired, matched_error};
 use crate::{
     feedback::AxisState,
-    format::{MAX_AXES, MAX_ERRORS},
+    format::{MAX_AXES, MAX_ERRORS, MAX_INPUTS},
     model::Model,
     preview::Preview,
 };
@@ -108,6 +108,27 @@ pub(super) fn errors<const D: usize, const N: usize>(
         }
     }
     errors
+}
+
+/// What is desired of each axis of the monitor: at the time of the measurement, and now, of each reference channel that moves it;
+/// `base` names the desired channel from which a reference channel starts.
+pub(super) fn desired<const D: usize, const N: usize>(
+    model: &Model<'_>,
+    tick: i32,
+    preview: &Preview<D, N>,
+    base: impl Fn(usize) -> usize,
+) -> ([f32; MAX_AXES], [[f32; MAX_INPUTS]; MAX_AXES]) {
+    let (mut desired, mut references) = ([0.0; MAX_AXES], [[0.0; MAX_INPUTS]; MAX_AXES]);
+    let Some(monitor) = model.monitor() else { return (desired, references) };
+    let card = model.card();
+    for (((axis, _), desired), references) in monitor.axes().iter().zip(&mut desired).zip(&mut references) {
+        *desired = matched_desired(tick, card.timing.measurement_delay_ticks, preview, axis.error.1);
+        for (output, reference) in axis.inputs.iter().zip(references) {
+            let channel = card.outputs.get(usize::from(*output)).map_or(0, |output| usize::from(output.channel));
+            *reference = preview.channel(tick, base(channel));
+        }
+    }
+    (desired, references)
 }
 
 /// Errors of each axis of the monitor, most of which the feedback lane has already.

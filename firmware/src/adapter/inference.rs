@@ -5,8 +5,7 @@
 
 use crate::{
     format::{MAX_FEATURES, MAX_OUTPUTS},
-    math::finite_or_zero,
-    network::{Network, Scratch},
+    network::{Network, Scratch, meant},
 };
 
 /// One evaluation of the network that is to be done.
@@ -14,7 +13,7 @@ use crate::{
 pub struct Job {
     /// Reference tick at which it was released.
     pub tick: i32,
-    /// The model's features, in physical units; zeros behind the last.
+    /// The model's features, in physical units; what is behind the last is not read.
     pub inputs: [f32; MAX_FEATURES],
 }
 
@@ -31,10 +30,11 @@ impl Job {
     /// Where one is put.
     pub const EMPTY: Self = Self { tick: 0, inputs: [0.0; MAX_FEATURES] };
 
-    /// Evaluates the network. With a scratch of fewer words than the network needs every correction is zero.
+    /// Evaluates the network. A correction that is no number, or larger than any that is believed, was not meant and is zero;
+    /// with a scratch of fewer words than the network needs each one is.
     pub fn run<const S: usize>(&self, network: &Network<'_>, scratch: &mut Scratch<S>) -> Inference {
         let mut outputs = [0.0; MAX_OUTPUTS];
         network.evaluate(&self.inputs, &mut outputs, scratch);
-        Inference { tick: self.tick, outputs: outputs.map(finite_or_zero) }
+        Inference { tick: self.tick, outputs: outputs.map(meant) }
     }
 }

@@ -4,7 +4,13 @@
 //! *never* a step when an inference is late: the correction stays where it is; *source* the sub-rate of Zhou 2017.
 
 use super::Inference;
-use crate::format::{Interpolation, MAX_OUTPUTS};
+use crate::{
+    format::{Interpolation, MAX_OUTPUTS},
+    math::clamp,
+};
+
+/// Bound of the outputs that are believed: differences of such numbers are numbers.
+const LARGEST: f32 = 1e9;
 
 /// The correction between two sub-rate ticks.
 #[derive(Clone, Debug)]
@@ -14,6 +20,8 @@ pub(super) struct Ramp {
     primed: bool,
     /// Reference tick whose inference is awaited, and the newest that came.
     awaited: Option<i32>,
+    /// Share of its outputs that may act,
+    share: f32,
     delivered: Option<Inference>,
     /// Inferences in a row that did not come in time.
     missing: u16,
@@ -27,19 +35,20 @@ impl Ramp {
         end: [0.0; MAX_OUTPUTS],
         primed: false,
         awaited: None,
+        share: 0.0,
         delivered: None,
         missing: 0,
         late: 0,
     };
 
-    /// A job was released at this reference tick.
-    pub(super) fn release(&mut self, tick: i32) {
-        self.awaited = Some(tick);
+    /// A job was released at this reference tick, of whose outputs this share may act, 0..=1.
+    pub(super) fn release(&mut self, tick: i32, share: f32) {
+        (self.awaited, self.share) = (Some(tick), share);
     }
 
-    /// Takes the result of the last job; one that is not awaited any more is dropped.
+    /// Takes the result of the last job; one that is not awaited any more, or not a number in each output, is dropped.
     pub(super) fn deliver(&mut self, inference: Inference) {
-        if self.awaited == Some(inference.tick) {
+        if self.awaited == Some(inference.tick) && inference.outputs.iter().all(|output| output.is_finite()) {
             self.delivered = Some(inference);
         }
     }
@@ -51,6 +60,11 @@ impl Ramp {
         }
     }
 
+    /// A sub-rate tick was missed, and nothing was released at it: the correction stays.
+    pub(super) fn hold(&mut self) {
+        self.start = self.end;
+    }
+
     /// Makes the awaited inference, if there is one, the new end at once.
     pub(super) fn publish(&mut self) {
         let Some(awaited) = self.awaited.take() else { return };
@@ -59,6 +73,7 @@ impl Ramp {
         self.start = self.end;
         match inference {
             Some(Inference { outputs, .. }) => {
+                let outputs = outputs.map(|output| clamp(output, -LARGEST, LARGEST) * self.share);
                 if !self.primed {
                     self.start = outputs;
                 }
@@ -72,6 +87,11 @@ impl Ramp {
     /// Forgets everything but the count of late inferences.
     pub(super) fn clear(&mut self) {
         *self = Self { late: self.late, ..Self::EMPTY };
+    }
+
+    /// Share of the newest inference that may act.
+    pub(super) fn share(&self) -> f32 {
+        self.share
     }
 
     /// Whether there is a correction, and the newest inference was in time.
@@ -119,12 +139,12 @@ mod tests {
     fn a_late_inference_is_counted_and_the_correction_stays_until_one_is_in_time() {
         let mut ramp = Ramp::EMPTY;
         let value = |ramp: &Ramp, phase| ramp.value(Interpolation::Linear, phase, 4)[0];
-        ramp.release(0);
+        ramp.release(0, 1.0);
         assert_eq!(value(&ramp, 0), 0.0);
         ramp.deliver(inference(0, 2.0));
         ramp.settle(1);
         assert_eq!([1, 2, 3].map(|phase| value(&ramp, phase)), [2.0; 3]);
-        ramp.release(4);
+        ramp.release(4, 1.0);
         // The result of another tick is not the awaited one.
         ramp.deliver(inference(0, 9.0));
         ramp.settle(5);
@@ -132,7 +152,7 @@ mod tests {
         assert_eq!([1, 3].map(|phase| value(&ramp, phase)), [2.0; 2]);
         // It comes when nobody waits for it any more.
         ramp.deliver(inference(4, 9.0));
-        ramp.release(8);
+        ramp.release(8, 1.0);
         ramp.deliver(inference(8, 6.0));
         ramp.settle(9);
         assert!(ramp.current() && ramp.late() == 1);

@@ -8,7 +8,7 @@
 //! output off): there the lane would be its own clamp and nothing else. A limit inside of the range is a decision, not an error:
 //! [`OutputBounds::reach`] says so. Outside of the envelope only the limits hold.
 
-use super::{Blob, Card, Floats, MAX_FEATURES, Refusal};
+use super::{Blob, Card, Floats, Refusal};
 use crate::math::abs;
 
 /// Numbers stored for each output.
@@ -96,14 +96,9 @@ impl<'a> Bounds<'a> {
     }
 
     /// Refuses outputs that the bounds exclude for these features.
-    pub(crate) fn check(
-        &self,
-        inputs: &[f32; MAX_FEATURES],
-        outputs: &[f32],
-        envelope: &(Floats<'a>, Floats<'a>),
-    ) -> Result<(), Refusal> {
-        let inside = |((low, high), input): ((f32, f32), &f32)| (low..=high).contains(input);
-        if !envelope.0.iter().zip(envelope.1.iter()).zip(inputs).all(inside) {
+    pub(crate) fn check(&self, inputs: Floats<'a>, outputs: &[f32], envelope: &(Floats<'a>, Floats<'a>)) -> Result<(), Refusal> {
+        let inside = |((low, high), input): ((f32, f32), f32)| (low..=high).contains(&input);
+        if !envelope.0.iter().zip(envelope.1.iter()).zip(inputs.iter()).all(inside) {
             return Ok(());
         }
         let broken = self.iter().zip(outputs).position(|(bounds, output)| !(bounds.low..=bounds.high).contains(output));

@@ -342,7 +342,7 @@ pub struct Card<'a> {
 
 impl Card<'_> {
     /// Of no model.
-    pub(crate) const EMPTY: Self = {
+    pub(crate) const fn empty() -> Self {
         let section = Section { offset: 0, length: 0 };
         Self {
             name: "",
@@ -364,7 +364,7 @@ impl Card<'_> {
             bounds: section,
             probes: Probes { count: 0, network: section, feedback: section },
         }
-    };
+    }
 
     /// Reference ticks of the past and of the future that the features and the lane read.
     pub fn preview_span(&self) -> (u32, u32) {

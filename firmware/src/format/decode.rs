@@ -8,7 +8,10 @@
 use heapless::Vec;
 use serde::Deserialize;
 
-use super::{Card, Refusal};
+use super::{Arithmetic, Authority, Card, FeedbackLayout, Margins, MonitorLayout, NetworkLayout, Refusal, Section};
+
+/// Where a section is of which nothing has been read yet.
+const NOWHERE: Section = Section { offset: 0, length: 0 };
 
 /// Decodes into `card`.
 ///
@@ -26,13 +29,72 @@ pub(crate) fn card<'a>(mut bytes: &'a [u8], card: &mut Card<'a>) -> Result<&'a [
     take(rest, timing)?;
     list(rest, features, "number of features")?;
     list(rest, outputs, "number of outputs")?;
-    take(rest, network)?;
-    take(rest, feedback)?;
-    take(rest, monitor)?;
+    network_lane(rest, network)?;
+    feedback_lane(rest, feedback)?;
+    response(rest, monitor)?;
     take(rest, envelope)?;
     take(rest, bounds)?;
     take(rest, probes)?;
     Ok(bytes)
+}
+
+fn network_lane(rest: &mut &[u8], place: &mut Option<NetworkLayout>) -> Result<(), Refusal> {
+    let Some(layout) = option(rest, place, || NetworkLayout {
+        arithmetic: Arithmetic::Float,
+        input_normalisation: NOWHERE,
+        input_code: 0.0,
+        layers: Vec::new(),
+        skip: NOWHERE,
+        output_normalisation: NOWHERE,
+    })?
+    else {
+        return Ok(());
+    };
+    take(rest, &mut layout.arithmetic)?;
+    take(rest, &mut layout.input_normalisation)?;
+    take(rest, &mut layout.input_code)?;
+    list(rest, &mut layout.layers, "number of layers")?;
+    take(rest, &mut layout.skip)?;
+    take(rest, &mut layout.output_normalisation)
+}
+
+fn feedback_lane(rest: &mut &[u8], place: &mut Option<FeedbackLayout>) -> Result<(), Refusal> {
+    let Some(layout) = option(rest, place, || FeedbackLayout {
+        lags: 0,
+        axes: Vec::new(),
+        authority: Authority { channels: Vec::new(), scale: 0.0, error_scale: 0.0, decay: 0.0 },
+        margins: Margins { delay_ms: 0.0, gain: 0.0, modulus: 0.0 },
+    })?
+    else {
+        return Ok(());
+    };
+    take(rest, &mut layout.lags)?;
+    list(rest, &mut layout.axes, "number of axes of the feedback lane")?;
+    take(rest, &mut layout.authority)?;
+    take(rest, &mut layout.margins)
+}
+
+fn response(rest: &mut &[u8], place: &mut Option<MonitorLayout>) -> Result<(), Refusal> {
+    let Some(layout) = option(rest, place, || MonitorLayout { divisor: 0, taps: 0, validated_rms: 0.0, axes: Vec::new() })?
+    else {
+        return Ok(());
+    };
+    take(rest, &mut layout.divisor)?;
+    take(rest, &mut layout.taps)?;
+    take(rest, &mut layout.validated_rms)?;
+    list(rest, &mut layout.axes, "number of axes of the monitor")
+}
+
+/// Reads whether there is something, and makes room for it.
+#[inline(never)]
+fn option<'p, T>(rest: &mut &[u8], place: &'p mut Option<T>, empty: impl FnOnce() -> T) -> Result<Option<&'p mut T>, Refusal> {
+    let mut present = false;
+    take(rest, &mut present)?;
+    if !present {
+        *place = None;
+        return Ok(None);
+    }
+    Ok(Some(place.insert(empty())))
 }
 
 #[inline(never)]
@@ -81,7 +143,7 @@ mod tests {
             if cut {
                 bytes.truncate(keep.index(bytes.len()));
             }
-            let mut found = Card::EMPTY;
+            let mut found = Card::empty();
             let rest = card(&bytes, &mut found);
             match postcard::take_from_bytes::<Card<'_>>(&bytes) {
                 // By text: a number that is none is not equal to itself.

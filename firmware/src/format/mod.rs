@@ -10,7 +10,10 @@ pub(crate) mod decode;
 mod feature;
 pub mod file;
 mod file_buffer;
+mod range_check;
+pub mod ranges;
 mod refusal;
+pub mod trailer;
 
 pub use blob::{Blob, Floats, Words};
 pub use bounds::{Bounds, OutputBounds, Reach};

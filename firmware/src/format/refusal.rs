@@ -103,6 +103,8 @@ pub enum Refusal {
         /// Index of the probe; `u8::MAX` for the feedback lane's.
         index: u8,
     },
+    /// A network without a single probe: nothing would show that this machine computes what was meant.
+    NoProbes,
     /// A probe inside of the envelope gives an output that the stored bounds exclude.
     Bounds {
         /// Index of the output.
@@ -112,6 +114,17 @@ pub enum Refusal {
     Limit {
         /// Index of the output.
         output: u8,
+    },
+    /// The application stores signed models only, and behind this one is no signature.
+    Unsigned,
+    /// None of the application's keys has signed this model with this version: another key, or a byte is not what was signed.
+    Signature,
+    /// A model is stored whose signed version is higher.
+    Downgrade {
+        /// Version of this model.
+        found: u32,
+        /// Lowest version that is stored.
+        floor: u32,
     },
     /// The signal tables of the model and of the application differ.
     Signal {
@@ -133,6 +146,11 @@ pub enum Refusal {
         model: f32,
         /// Rate of the application, Hz.
         application: f32,
+    },
+    /// The application's bounds of the correction are none.
+    Cap {
+        /// What of them.
+        what: &'static str,
     },
 }
 
@@ -171,8 +189,17 @@ impl fmt::Display for Refusal {
                 write!(f, "{what} holds a number that is not finite: the training diverged or the file was edited")
             }
             Self::Value { what } => {
-                write!(f, "{what} is out of its meaningful range: correct it in the description and export again")
+                write!(f, "{what} is out of its meaningful range")?;
+                if let Some(range) = super::ranges::named(what) {
+                    write!(f, ", {} to {}", range.least, range.most)?;
+                }
+                write!(f, ": correct it in the description and export again")
             }
+            Self::NoProbes => write!(
+                f,
+                "the network has no probes, by which a machine sees that it computes the same bits: export the model again, \
+                 model-export always writes them"
+            ),
             Self::Index { what, found } => write!(f, "{what} names index {found}, which the model does not have"),
             Self::Duplicate { what, found } => {
                 write!(f, "{what} names index {found} twice: correct it in the description and export again")
@@ -194,6 +221,19 @@ impl fmt::Display for Refusal {
                      raise the limit, or make it 0 to switch the output off"
                 )
             }
+            Self::Unsigned => {
+                write!(f, "the model is not signed, and only signed ones are stored here: sign it with model-export sign")
+            }
+            Self::Signature => write!(
+                f,
+                "none of the keys that are trusted here has signed the model as it arrived: \
+                 sign it with the right key, or copy it again"
+            ),
+            Self::Downgrade { found, floor } => write!(
+                f,
+                "the model's signed version is {found}, lower than {floor} is not stored here: \
+                 sign the model that shall fly with a higher --model-version"
+            ),
             Self::Signal { signal, channel } => {
                 write!(
                     f,
@@ -206,6 +246,11 @@ impl fmt::Display for Refusal {
             Self::Rate { model, application } => {
                 write!(f, "trained for references at {model} Hz, the application runs {application} Hz")
             }
+            Self::Cap { what } => write!(
+                f,
+                "the application's bounds of the correction are not complete ({what}): give each reference channel a limit and a \
+                 rate that the vehicle or machine bears"
+            ),
         }
     }
 }

@@ -11,7 +11,12 @@
 //! what it would do without the feedback lane and in full, against no add-on at all, also while it is faded out: it comes back
 //! when it would do good.
 
-use super::{GuardSettings, Monitor, observation::Shares, watch::ewma_gain};
+use super::{
+    GuardSettings, Monitor,
+    observation::Outcome,
+    swing::{Parts, Swing},
+    watch::ewma_gain,
+};
 use crate::{
     format::{Floats, MAX_AXES, MAX_INPUTS, MAX_OUTPUTS, MAX_TAPS},
     math::{clamp, finite_or_zero},
@@ -20,36 +25,60 @@ use crate::{
 /// Bound of the errors that are believed.
 const LARGEST: f32 = 1e9;
 
-/// One contribution over the last monitor ticks.
+/// One signal over the last monitor ticks.
 #[derive(Clone, Copy, Debug)]
 struct Past {
     ring: [f32; MAX_TAPS],
     sum: f32,
-    /// Monitor ticks for which the loop still responds to it: as many as there are taps while it is other than zero.
-    left: u8,
 }
 
 impl Past {
-    const EMPTY: Self = Self { ring: [0.0; MAX_TAPS], sum: 0.0, left: 0 };
+    const EMPTY: Self = Self { ring: [0.0; MAX_TAPS], sum: 0.0 };
 
-    /// Ends a monitor tick and returns the response to this contribution; `head` is the newest tick's place in the ring.
-    fn respond(&mut self, response: Floats<'_>, head: usize, mean: f32) -> f32 {
+    /// Ends a monitor tick with this mean, which is the newest; `head` is its place in the ring.
+    fn close(&mut self, head: usize, mean: f32) -> f32 {
         let newest = finite_or_zero(self.sum * mean);
         self.sum = 0.0;
-        let taps = response.len();
-        // There are at most MAX_TAPS, which a u8 holds.
-        self.left = if newest == 0.0 { self.left.saturating_sub(1) } else { taps as u8 };
         if let Some(place) = self.ring.get_mut(head) {
             *place = newest;
         }
-        if self.left == 0 {
-            return 0.0;
-        }
-        let ring = self.ring.get(..taps).unwrap_or_default();
+        newest
+    }
+
+    /// The response to this signal.
+    fn response(&self, response: Floats<'_>, head: usize) -> f32 {
+        let ring = self.ring.get(..response.len()).unwrap_or_default();
         let Some((newer, older)) = ring.split_at_checked(head) else { return 0.0 };
         // From the newest on, which is the first of the upper part.
         let (near, far) = response.split_at(older.len());
         dot(far, newer, dot(near, older, 0.0))
+    }
+}
+
+/// What was added to one input: the network's part, the feedback lane's, and what the network would add to its part in full and
+/// without the other.
+#[derive(Clone, Copy, Debug)]
+struct Contributions {
+    pasts: [Past; 3],
+    /// Monitor ticks for which the loop still responds to each: as many as there are taps while it is other than zero.
+    left: [u8; 3],
+}
+
+impl Contributions {
+    const EMPTY: Self = Self { pasts: [Past::EMPTY; 3], left: [0; 3] };
+
+    /// Ends a monitor tick and returns the responses.
+    fn respond(&mut self, response: Floats<'_>, head: usize, mean: f32) -> [f32; 3] {
+        let mut responses = [0.0; 3];
+        for ((past, left), answer) in self.pasts.iter_mut().zip(&mut self.left).zip(&mut responses) {
+            let newest = past.close(head, mean);
+            // There are at most MAX_TAPS, which a u8 holds.
+            *left = if newest == 0.0 { left.saturating_sub(1) } else { response.len() as u8 };
+            if *left > 0 {
+                *answer = past.response(response, head);
+            }
+        }
+        responses
     }
 }
 
@@ -82,11 +111,16 @@ pub struct Counterfactual {
     /// Place of the next newest in the rings.
     head: usize,
     errors: [f32; MAX_AXES],
-    /// Of each axis and input: the network's part, the feedback's, and what the network would add to its part in full and without
-    /// the other.
-    pasts: [[[Past; 3]; MAX_INPUTS]; MAX_AXES],
+    /// Of each axis and input.
+    contributions: [[Contributions; MAX_INPUTS]; MAX_AXES],
+    /// Of each axis what is desired: of the reference channels that move it,
+    references: [[Past; MAX_INPUTS]; MAX_AXES],
+    /// and of the axis itself at the time of the measurement.
+    desired: [f32; MAX_AXES],
     energies: Energies,
     harmful: [bool; 2],
+    /// What swings.
+    swing: Swing,
     /// Something was added since the start, or since all was forgotten.
     busy: bool,
 }
@@ -97,9 +131,12 @@ impl Counterfactual {
         phase: 0,
         head: 0,
         errors: [0.0; MAX_AXES],
-        pasts: [[[Past::EMPTY; 3]; MAX_INPUTS]; MAX_AXES],
+        contributions: [[Contributions::EMPTY; MAX_INPUTS]; MAX_AXES],
+        references: [[Past::EMPTY; MAX_INPUTS]; MAX_AXES],
+        desired: [0.0; MAX_AXES],
         energies: Energies { with: 0.0, without_feedback: 0.0, network_only: 0.0, baseline: 0.0, long_term_baseline: 0.0 },
         harmful: [false; 2],
+        swing: Swing::NONE,
         busy: false,
     };
 
@@ -113,35 +150,57 @@ impl Counterfactual {
         self.harmful
     }
 
+    /// What swings, and what the feedback lane does against it.
+    pub(super) fn swing(&self) -> &Swing {
+        &self.swing
+    }
+
     /// Forgets everything: no lane has acted for long, or ticks are missing.
     pub(super) fn reset(&mut self) {
         if !self.busy {
             return;
         }
         // In place: as a whole it would be 3 KB of the control task's stack.
-        for past in self.pasts.iter_mut().flatten().flatten() {
+        for contributions in self.contributions.iter_mut().flatten() {
+            *contributions = Contributions::EMPTY;
+        }
+        for past in self.references.iter_mut().flatten() {
             *past = Past::EMPTY;
         }
-        (self.phase, self.head, self.errors) = (0, 0, [0.0; MAX_AXES]);
+        (self.phase, self.head, self.errors, self.desired) = (0, 0, [0.0; MAX_AXES], [0.0; MAX_AXES]);
         (self.energies, self.harmful, self.busy) = (Energies::default(), [false; 2], false);
+        self.swing = Swing::NONE;
     }
 
     /// Adds a reference tick with the errors of the monitor's axes.
-    pub(super) fn observe(
-        &mut self,
-        monitor: &Monitor<'_>,
-        errors: &[f32],
-        shares: &Shares,
-        settings: &GuardSettings,
-        rate_hz: f32,
-    ) {
+    pub(super) fn observe(&mut self, monitor: &Monitor<'_>, seen: &Outcome, settings: &GuardSettings, rate_hz: f32) {
+        let shares = &seen.shares;
+        self.swing.rely(seen.network, settings, 1.0 / rate_hz);
+        let believed = |value: f32| clamp(finite_or_zero(value), -LARGEST, LARGEST);
+        if !self.busy {
+            // As if what is desired now had been desired for long.
+            for (pasts, values) in self.references.iter_mut().zip(&seen.references) {
+                for (past, value) in pasts.iter_mut().zip(values) {
+                    past.ring = [believed(*value); MAX_TAPS];
+                }
+            }
+        }
         self.busy = true;
-        for (sum, error) in self.errors.iter_mut().zip(errors) {
-            *sum += clamp(finite_or_zero(*error), -LARGEST, LARGEST);
+        for (sum, error) in self.errors.iter_mut().zip(&seen.errors) {
+            *sum += believed(*error);
+        }
+        for (sum, desired) in self.desired.iter_mut().zip(&seen.desired) {
+            *sum += believed(*desired);
+        }
+        for (pasts, values) in self.references.iter_mut().zip(&seen.references) {
+            for (past, value) in pasts.iter_mut().zip(values) {
+                past.sum += believed(*value);
+            }
         }
         let share = |shares: &[f32; MAX_OUTPUTS], output: u8| shares.get(usize::from(output)).copied().unwrap_or(0.0);
-        for ((axis, _), pasts) in monitor.axes().iter().zip(&mut self.pasts) {
-            for (&output, [network, feedback, more]) in axis.inputs.iter().zip(pasts) {
+        for ((axis, _), contributions) in monitor.axes().iter().zip(&mut self.contributions) {
+            for (&output, contributions) in axis.inputs.iter().zip(contributions) {
+                let [network, feedback, more] = &mut contributions.pasts;
                 let acted = share(&shares.network, output);
                 network.sum += acted;
                 feedback.sum += share(&shares.feedback, output);
@@ -161,19 +220,32 @@ impl Counterfactual {
         let mean = 1.0 / ticks;
         self.head = if self.head == 0 { monitor.taps().saturating_sub(1) } else { self.head - 1 };
         let mut now = Energies::default();
+        let mut parts: [Parts; MAX_AXES] = [[0.0; 4]; MAX_AXES];
         let [mut acts, mut assisted] = [false; 2];
-        for (((axis, response), pasts), error) in monitor.axes().iter().zip(&mut self.pasts).zip(&mut self.errors) {
+        let desired = self.references.iter_mut().zip(&mut self.desired);
+        let axes = monitor.axes().iter().zip(&mut self.contributions).zip(&mut self.errors).zip(&mut parts);
+        for (((((axis, response), contributions), error), parts), (references, desired)) in axes.zip(desired) {
             let with = *error * mean;
             *error = 0.0;
+            // Relative to what is desired now: a response that ends too early is no error that grows with the position.
+            let mut nominal = -*desired * mean;
+            *desired = 0.0;
             let [mut network, mut feedback, mut more] = [0.0; 3];
             let mut rest = *response;
-            for (_, pasts) in axis.inputs.iter().zip(pasts) {
+            let inputs = axis.inputs.iter().zip(contributions).zip(references.iter_mut().enumerate());
+            for ((_, contributions), (index, reference)) in inputs {
                 let (taps, others) = rest.split_at(monitor.taps());
                 rest = others;
-                let responses = pasts.each_mut().map(|past| past.respond(taps, self.head, mean));
-                acts |= usize::from(pasts[0].left) == monitor.taps();
+                let present = reference.sum * mean;
+                reference.close(self.head, mean);
+                nominal += reference.response(taps, self.head);
+                if index == 0 {
+                    nominal += present * (1.0 - taps.iter().sum::<f32>());
+                }
+                let responses = contributions.respond(taps, self.head, mean);
+                acts |= usize::from(contributions.left[0]) == monitor.taps();
                 // As long as the loop responds to it.
-                assisted |= pasts[1].left > 0;
+                assisted |= contributions.left[1] > 0;
                 network += responses[0];
                 feedback += responses[1];
                 more += responses[2];
@@ -183,6 +255,7 @@ impl Counterfactual {
             now.without_feedback += unaided * unaided;
             now.network_only += (unaided + more) * (unaided + more);
             now.baseline += (unaided - network) * (unaided - network);
+            *parts = [with, unaided, feedback, nominal];
         }
         let weight = |seconds: f32| ewma_gain(ticks / (seconds * rate_hz));
         let recent = weight(settings.counterfactual_s);
@@ -205,5 +278,6 @@ impl Counterfactual {
         // While the network acts, what is measured must be worse too.
         let network = worse(past.network_only, baseline, factor) && (!acts || worse(past.with, baseline, factor));
         self.harmful = [network, worse(past.with, past.without_feedback + share, settings.counterfactual_factor)];
+        self.swing.observe(&parts, monitor.validated_rms(), settings, ticks / rate_hz);
     }
 }

@@ -5,7 +5,7 @@
 
 use super::{GuardSettings, Monitor};
 use crate::{
-    format::{FeedbackLayout, Floats, MAX_AXES, MAX_OUTPUTS},
+    format::{FeedbackLayout, Floats, MAX_AXES, MAX_INPUTS, MAX_OUTPUTS},
     lanes::Lanes,
 };
 
@@ -38,14 +38,28 @@ pub(crate) struct Outcome {
     pub(crate) active: bool,
     /// and what it asked for on each of its axes, in the outputs' units.
     pub(crate) asked: [f32; MAX_AXES],
+    /// Share of the network lane's correction that acts, 0..=1.
+    pub(crate) network: f32,
     /// Errors of the monitor's axes, in their unit.
     pub(crate) errors: [f32; MAX_AXES],
+    /// What is desired of them: at the time of the measurement,
+    pub(crate) desired: [f32; MAX_AXES],
+    /// and now, of each reference channel that moves them.
+    pub(crate) references: [[f32; MAX_INPUTS]; MAX_AXES],
 }
 
 impl Outcome {
     /// Nothing: all zeros.
-    pub(crate) const NONE: Self =
-        Self { shares: Shares::NONE, excess: [false; 2], active: false, asked: [0.0; MAX_AXES], errors: [0.0; MAX_AXES] };
+    pub(crate) const NONE: Self = Self {
+        shares: Shares::NONE,
+        excess: [false; 2],
+        active: false,
+        asked: [0.0; MAX_AXES],
+        network: 0.0,
+        errors: [0.0; MAX_AXES],
+        desired: [0.0; MAX_AXES],
+        references: [[0.0; MAX_INPUTS]; MAX_AXES],
+    };
 }
 
 /// The network lane's features against the box of those in training.
@@ -86,12 +100,16 @@ pub(crate) struct Observation<'a> {
     pub(crate) last: Option<&'a Outcome>,
     /// The network lane's features.
     pub(crate) features: Features,
-    /// Whether every measured and desired channel is a finite number.
+    /// Whether every desired channel is a finite number.
     pub(crate) finite: bool,
+    /// Reference ticks in a row without a measurement that is a number in each channel.
+    pub(crate) bad: u16,
     /// Inferences in a row that came too late.
     pub(crate) late: u16,
     /// Age of the newest measurement beyond the model's delay, reference ticks.
     pub(crate) age: u16,
+    /// Whether there is a desired trajectory.
+    pub(crate) trajectory: bool,
 }
 
 /// What the lanes may do in this reference tick.
@@ -101,4 +119,6 @@ pub(crate) struct Verdict {
     pub(crate) allowed: Lanes,
     /// Least change of weight in a reference tick of a lane that tripped.
     pub(crate) handover_step: f32,
+    /// Share of the feedback lane that may act, 0..=1.
+    pub(crate) share: f32,
 }

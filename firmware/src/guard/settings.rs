@@ -23,6 +23,9 @@ pub struct GuardSettings {
     /// A feature may leave the training envelope by this much, in its unit, in addition to the margin: an envelope can have no
     /// width.
     pub envelope_floor: f32,
+    /// The network lane acts in full as long as the window of the desired trajectory moves by no more than this share beyond what
+    /// it moved by in training; from there on it acts less, before its features are outside.
+    pub window_margin: f32,
     /// The network lane trips after this many sub-rate ticks in a row with a feature outside; 0 counts as 1.
     pub envelope_ticks: u16,
     /// Both lanes trip when the newest measurement is older than the model's measurement delay by more than this time, s.
@@ -31,6 +34,8 @@ pub struct GuardSettings {
     pub saturated_share: f32,
     /// The share of saturated ticks is an exponentially weighted mean with this time constant, s.
     pub saturated_s: f32,
+    /// A lane stays off after this many trips by saturation, until it is armed again.
+    pub saturated_trips: u16,
     /// The network lane trips after this many inferences in a row that came too late; 0 counts as 1.
     pub late_in_a_row: u16,
     /// A lane trips when the RMS of the error with it is more than this factor of what it would be without the lane, beyond the
@@ -68,6 +73,32 @@ pub struct GuardSettings {
     pub oscillation_s: f32,
     /// The feedback lane stays off after this many trips by oscillation, until it is armed again: each return would swing again.
     pub oscillation_trips: u16,
+    /// What is slower than this time constant, s, does not swing: a payload, a steady wind, the integral.
+    pub swing_s: f32,
+    /// The feedback lane acts in full until what swings comes to this share of what makes it trip astray; from there on it acts
+    /// less.
+    pub swing_onset: f32,
+    /// It begins with this share, as the loop's delay is not known yet,
+    pub swing_start: f32,
+    /// and its share may grow by one in this time, s.
+    pub swing_recovery_s: f32,
+    /// The feedback lane trips when what swings of the error is more than this share of what would swing without the lane, beyond
+    /// what the desired trajectory and the floor allow. A lane that damps leaves a half and less.
+    pub astray_left: f32,
+    /// What the loop's nominal response to the desired trajectory leads to allows this factor of it in addition,
+    pub astray_factor: f32,
+    /// or this share where the network lane has acted in full for long.
+    pub astray_share: f32,
+    /// What swings may be this many times the model's validated RMS in addition.
+    pub astray_floor: f32,
+    /// A feedback lane whose part of the response swings by less than this share of the error does not lead it astray.
+    pub astray_cause: f32,
+    /// The energies of what swings are exponentially weighted means with this time constant, s.
+    pub astray_s: f32,
+    /// The network lane has acted in full for long after several times this time constant, s.
+    pub relied_s: f32,
+    /// The feedback lane stays off after this many trips astray, until it is armed again.
+    pub astray_trips: u16,
 }
 
 impl GuardSettings {
@@ -81,10 +112,12 @@ impl GuardSettings {
         handover_s: 0.0,
         envelope_margin: 0.0,
         envelope_floor: 0.0,
+        window_margin: 0.0,
         envelope_ticks: 0,
         stale_s: 0.0,
         saturated_share: 0.0,
         saturated_s: 0.0,
+        saturated_trips: 0,
         late_in_a_row: 0,
         counterfactual_factor: 0.0,
         assisted_factor: 0.0,
@@ -98,6 +131,18 @@ impl GuardSettings {
         oscillation_power: 0.0,
         oscillation_s: 0.0,
         oscillation_trips: 0,
+        swing_s: 0.0,
+        swing_onset: 0.0,
+        swing_start: 0.0,
+        swing_recovery_s: 0.0,
+        astray_left: 0.0,
+        astray_factor: 0.0,
+        astray_share: 0.0,
+        astray_floor: 0.0,
+        astray_cause: 0.0,
+        astray_s: 0.0,
+        relied_s: 0.0,
+        astray_trips: 0,
     };
 
     const DEFAULT: Self = Self {
@@ -106,10 +151,12 @@ impl GuardSettings {
         handover_s: 0.15,
         envelope_margin: 0.5,
         envelope_floor: 0.02,
+        window_margin: 0.1,
         envelope_ticks: 5,
         stale_s: 0.1,
         saturated_share: 0.5,
         saturated_s: 1.0,
+        saturated_trips: 3,
         late_in_a_row: 5,
         counterfactual_factor: 1.2,
         assisted_factor: 2.0,
@@ -123,6 +170,18 @@ impl GuardSettings {
         oscillation_power: 0.8,
         oscillation_s: 0.5,
         oscillation_trips: 1,
+        swing_s: 0.1,
+        swing_onset: 0.7,
+        swing_start: 0.3,
+        swing_recovery_s: 2.0,
+        astray_left: 0.7,
+        astray_factor: 1.0,
+        astray_share: 0.3,
+        astray_floor: 0.6,
+        astray_cause: 0.3,
+        astray_s: 0.2,
+        relied_s: 1.0,
+        astray_trips: 2,
     };
 }
 

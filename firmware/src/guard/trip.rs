@@ -24,12 +24,22 @@ pub enum Trip {
     Late = 5,
     /// A limit cycle (feedback lane).
     Oscillation = 6,
+    /// The loop tracks worse than it would without the add-on, were its response the nominal one (feedback lane).
+    Astray = 7,
 }
 
 impl Trip {
     /// All reasons, in the order of their indices.
-    pub const ALL: [Self; 7] =
-        [Self::Envelope, Self::NotFinite, Self::Stale, Self::Saturated, Self::Counterfactual, Self::Late, Self::Oscillation];
+    pub const ALL: [Self; 8] = [
+        Self::Envelope,
+        Self::NotFinite,
+        Self::Stale,
+        Self::Saturated,
+        Self::Counterfactual,
+        Self::Late,
+        Self::Oscillation,
+        Self::Astray,
+    ];
 
     /// Index in [`Trips`]; the same in every version.
     pub fn index(self) -> usize {
@@ -46,6 +56,7 @@ impl Trip {
             Self::Counterfactual => "counterfactual",
             Self::Late => "late",
             Self::Oscillation => "oscillation",
+            Self::Astray => "astray",
         }
     }
 }

@@ -7,15 +7,13 @@ use crate::{
     feedback::{self, Lane},
     format::{
         Blob, Bounds, Card, FeedbackLayout, Floats, HISTORY, MAX_ERRORS, MAX_FEATURES, MAX_LAGS, MAX_OUTPUTS, MAX_TAPS,
-        MAX_WIDTH, MonitorLayout, Refusal, Relative, Source,
+        MAX_WIDTH, MonitorLayout, Refusal, Relative, Source, ranges,
     },
     network::{Network, Scratch},
 };
 
 /// Longest look into the past or the future of one feature, in reference ticks.
 const MAX_OFFSET_TICKS: i32 = 10_000;
-/// Reference rates whose period is a useful number, Hz.
-const RATES_HZ: core::ops::RangeInclusive<f32> = 1e-3..=1e6;
 
 /// Indices, ranges and values of a card.
 #[inline(never)]
@@ -42,17 +40,10 @@ pub(super) fn card(card: &Card<'_>) -> Result<(), Refusal> {
 
 fn timing(card: &Card<'_>) -> Result<(), Refusal> {
     let timing = &card.timing;
-    let rate = timing.reference_rate_hz;
-    if !RATES_HZ.contains(&rate) {
-        return Err(Refusal::Value { what: "reference rate" });
-    }
-    if timing.divisor == 0 {
-        return Err(Refusal::Value { what: "sub-rate divisor" });
-    }
-    if !(timing.measurement_delay_ticks >= 0.0 && timing.measurement_delay_ticks < 1000.0) {
-        return Err(Refusal::Value { what: "measurement delay" });
-    }
-    Ok(())
+    ranges::RATE.check(timing.reference_rate_hz)?;
+    ranges::DIVISOR.check(timing.divisor.into())?;
+    ranges::DELAY.check(timing.measurement_delay_ticks)?;
+    ranges::FADE.demand(ranges::fade(timing.fade_ticks, timing.reference_rate_hz))
 }
 
 fn signals(card: &Card<'_>) -> Result<(), Refusal> {
@@ -104,7 +95,7 @@ fn outputs(card: &Card<'_>) -> Result<(), Refusal> {
         if card.outputs.iter().take(index).any(|other| other.channel == found) {
             return Err(Refusal::Duplicate { what: "output channel", found });
         }
-        if !(output.limit.is_finite() && output.limit >= 0.0 && output.slew.is_finite() && output.slew > 0.0) {
+        if !ranges::output(output.limit, output.slew) {
             return Err(Refusal::Value { what: "output limit or slew" });
         }
     }
@@ -123,12 +114,9 @@ fn lane(card: &Card<'_>, lane: &FeedbackLayout) -> Result<(), Refusal> {
     if let Some(&found) = authority.channels.iter().find(|&&channel| usize::from(channel) >= card.signals.desired.len()) {
         return Err(Refusal::Index { what: "lane authority channel", found });
     }
-    if !(authority.scale.is_finite()
-        && authority.scale > 0.0
-        && authority.error_scale.is_finite()
-        && authority.error_scale > 0.0
-        && authority.decay >= 0.0
-        && authority.decay < 1.0)
+    if !(ranges::AUTHORITY.holds(authority.scale)
+        && ranges::AUTHORITY.holds(authority.error_scale)
+        && ranges::decay(authority.decay, card.timing.reference_rate_hz))
     {
         return Err(Refusal::Value { what: "lane authority" });
     }
@@ -152,7 +140,7 @@ fn lane(card: &Card<'_>, lane: &FeedbackLayout) -> Result<(), Refusal> {
             }
         }
         let limits = [axis.fast_limit, axis.integral_limit];
-        if !axis.integral.is_finite() || limits.iter().any(|limit| !(limit.is_finite() && *limit >= 0.0)) {
+        if !(ranges::LANE_INTEGRAL.holds(axis.integral) && limits.iter().all(|limit| ranges::LANE_LIMIT.holds(*limit))) {
             return Err(Refusal::Value { what: "lane integral or limit" });
         }
     }
@@ -163,12 +151,8 @@ fn monitor(card: &Card<'_>, monitor: &MonitorLayout) -> Result<(), Refusal> {
     if monitor.taps == 0 || usize::from(monitor.taps) > MAX_TAPS {
         return Err(Refusal::Shape { what: "monitor taps", found: monitor.taps.into(), limit: MAX_TAPS as u32 });
     }
-    if monitor.divisor == 0 {
-        return Err(Refusal::Value { what: "monitor divisor" });
-    }
-    if !(monitor.validated_rms.is_finite() && monitor.validated_rms >= 0.0) {
-        return Err(Refusal::Value { what: "validated RMS of the monitor" });
-    }
+    ranges::MONITOR_DIVISOR.check(monitor.divisor.into())?;
+    ranges::VALIDATED_RMS.check(monitor.validated_rms)?;
     for axis in &monitor.axes {
         let (measured, desired) = axis.error;
         if usize::from(measured) >= card.signals.measured.len() {
@@ -192,7 +176,7 @@ fn monitor(card: &Card<'_>, monitor: &MonitorLayout) -> Result<(), Refusal> {
 /// Smallest and largest value of each feature.
 type Envelope<'a> = (Floats<'a>, Floats<'a>);
 
-/// Re-runs the network's probes: the bits must be the file's, and within its bounds.
+/// Re-runs the network's probes, of which there must be one: the bits must be the file's, and within its bounds.
 #[inline(never)]
 pub(super) fn network_probes<'a>(
     card: &Card<'a>,
@@ -205,18 +189,20 @@ pub(super) fn network_probes<'a>(
     let stored = blob.floats(card.probes.network, count * (inputs + outputs), "network probes")?;
     let (probe_inputs, probe_outputs) = stored.split_at(count * inputs);
     let Some((network, envelope, bounds)) = network else { return Ok(()) };
-    let (mut x, mut y) = ([0.0; MAX_FEATURES], [0.0; MAX_OUTPUTS]);
+    if count == 0 {
+        return Err(Refusal::NoProbes);
+    }
+    let mut y = [0.0; MAX_OUTPUTS];
     for probe in 0..count {
-        for (i, value) in x.iter_mut().enumerate().take(inputs) {
-            *value = probe_inputs.get(probe * inputs + i);
-        }
-        network.evaluate(&x, &mut y, scratch);
+        // Read where they are: an array of them would lie on the stack below the model that is checked.
+        let (x, _) = probe_inputs.split_at(probe * inputs).1.split_at(inputs);
+        network.evaluate_each(x.iter(), &mut y, scratch);
         let same =
             (0..outputs).all(|o| y.get(o).is_some_and(|y| y.to_bits() == probe_outputs.get(probe * outputs + o).to_bits()));
         if !same {
             return Err(Refusal::Probe { index: probe as u8 });
         }
-        bounds.check(&x, &y, envelope)?;
+        bounds.check(x, &y, envelope)?;
     }
     Ok(())
 }

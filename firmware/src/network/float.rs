@@ -4,7 +4,10 @@
 //! [`super::kernel`].
 
 use super::{kernel, shape::ROWS};
-use crate::format::{Activation, Blob, LayerLayout, Refusal, Section};
+use crate::format::{
+    Activation, Blob, LayerLayout, Refusal, Section,
+    ranges::{LAYER_ROWS, Range, SKIP_ROWS},
+};
 
 /// Inputs are padded to a multiple of this.
 const PADDING: usize = 2;
@@ -20,12 +23,12 @@ pub(super) struct Layer<'a> {
 impl<'a> Layer<'a> {
     pub(super) fn new(blob: &Blob<'a>, layout: &LayerLayout) -> Result<Self, Refusal> {
         let (inputs, outputs) = (layout.inputs.into(), layout.outputs.into());
-        Self::checked(blob, layout.rows, [inputs, outputs], layout.activation, "layer rows")
+        Self::checked(blob, layout.rows, [inputs, outputs], layout.activation, &LAYER_ROWS)
     }
 
     /// The linear skip.
     pub(super) fn skip(blob: &Blob<'a>, section: Section, inputs: usize, outputs: usize) -> Result<Self, Refusal> {
-        Self::checked(blob, section, [inputs, outputs], Activation::Linear, "skip rows")
+        Self::checked(blob, section, [inputs, outputs], Activation::Linear, &SKIP_ROWS)
     }
 
     fn checked(
@@ -33,11 +36,11 @@ impl<'a> Layer<'a> {
         section: Section,
         [inputs, outputs]: [usize; 2],
         activation: Activation,
-        what: &'static str,
+        range: &Range,
     ) -> Result<Self, Refusal> {
         let (inputs, outputs) = (inputs.next_multiple_of(PADDING), kernel::float_rows(outputs));
-        blob.floats(section, outputs * (1 + inputs), what)?;
-        let stream = blob.words(section, outputs * (1 + inputs), what)?.all();
+        range.all(blob.floats(section, outputs * (1 + inputs), range.what)?)?;
+        let stream = blob.words(section, outputs * (1 + inputs), range.what)?.all();
         let kernel = kernel::Float::new(stream, inputs as u16, activation == Activation::Relu, outputs as u16);
         Ok(Self { kernel, outputs: outputs as u16, tanh: activation == Activation::Tanh })
     }
@@ -56,7 +59,8 @@ impl<'a> Layer<'a> {
     #[inline(never)]
     pub(super) fn outputs(&self, inputs: &[u32], result: &mut [f32]) {
         let mut outputs = [0; ROWS];
-        self.run(inputs, &mut outputs);
+        // It is linear.
+        self.kernel.run(inputs, &mut outputs);
         for (result, output) in result.iter_mut().zip(outputs) {
             *result = f32::from_bits(output);
         }

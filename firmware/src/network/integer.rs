@@ -9,7 +9,7 @@ use super::{
     kernel::{self, Finish, Width, portable},
     shape::{INPUT_PADDING, ROWS, padded},
 };
-use crate::format::{Activation, Blob, Floats, LayerLayout, Refusal};
+use crate::format::{Activation, Blob, LayerLayout, Refusal, ranges::ROW_SCALES};
 
 /// One checked layer.
 #[derive(Debug)]
@@ -51,10 +51,13 @@ impl<'a> Layer<'a> {
         let kernel = kernel::Integer::new(width, stream, inputs, finish);
         let layer = Self { kernel, width, inputs: inputs as u16, limit };
         layer.refuse_overflow(index, before)?;
-        if next.is_none()
-            && !layer.blocks().all(|(_, _, scales)| scales.iter().all(|scale| f32::from_le_bytes(*scale).is_finite()))
-        {
-            return Err(Refusal::NotFinite { what: "layer row scales" });
+        if next.is_none() {
+            for scale in layer.blocks().flat_map(|(_, _, scales)| scales.map(f32::from_le_bytes)) {
+                if !scale.is_finite() {
+                    return Err(Refusal::NotFinite { what: ROW_SCALES.what });
+                }
+                ROW_SCALES.check(scale)?;
+            }
         }
         Ok(layer)
     }
@@ -115,31 +118,14 @@ fn code(value: f32, limit: i32) -> i16 {
     integer.clamp(-limit, limit) as i16
 }
 
-/// What an input is normalised with, and the code of 1.
-pub(super) struct Encoding<'a> {
-    pub(super) mean: Floats<'a>,
-    pub(super) reciprocal_scale: Floats<'a>,
-    pub(super) code: f32,
-}
-
-/// Normalises the inputs into `normalised`, which is padded with zeros, and makes `codes` of them, likewise.
+/// Makes codes of so many normalised inputs, which are padded with zeros, and likewise of those.
 #[inline(always)]
-pub(super) fn encode(encoding: &Encoding<'_>, inputs: &[f32], layers: &[Layer<'_>], normalised: &mut [u32], codes: &mut [u32]) {
+pub(super) fn encode(factor: f32, inputs: usize, layers: &[Layer<'_>], normalised: &[u32], codes: &mut [u32]) {
     let limit = layers.first().map_or(0, |layer| i32::from(layer.limit));
-    let normalisation = encoding.mean.iter().zip(encoding.reciprocal_scale.iter());
-    for ((place, input), (mean, reciprocal)) in normalised.iter_mut().zip(inputs).zip(normalisation) {
-        *place = ((*input - mean) * reciprocal).to_bits();
-    }
-    let mut padded = inputs.len();
-    while !padded.is_multiple_of(INPUT_PADDING) {
-        if let Some(place) = normalised.get_mut(padded) {
-            *place = 0;
-        }
-        padded += 1;
-    }
+    let padded = inputs.next_multiple_of(INPUT_PADDING);
     let pairs = normalised.as_chunks::<2>().0.iter().take(padded / 2);
     for (word, [low, high]) in codes.iter_mut().zip(pairs) {
-        let [low, high] = [*low, *high].map(|value| code(f32::from_bits(value) * encoding.code, limit));
+        let [low, high] = [*low, *high].map(|value| code(f32::from_bits(value) * factor, limit));
         *word = portable::pair(low, high);
     }
 }

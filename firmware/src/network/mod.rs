@@ -23,7 +23,7 @@ mod scratch;
 mod shape;
 mod tanh;
 
-use crate::format::{Arithmetic, Blob, Floats, MAX_FEATURES, MAX_LAYERS, MAX_OUTPUTS, NetworkLayout, Refusal};
+use crate::format::{Arithmetic, Blob, Floats, MAX_FEATURES, MAX_LAYERS, MAX_OUTPUTS, NetworkLayout, Refusal, ranges};
 
 pub use crate::format::Activation;
 pub use requantisation::requantise;
@@ -54,6 +54,17 @@ pub struct Network<'a> {
 }
 
 impl<'a> Network<'a> {
+    /// Checks shapes, sections and ranges of a layout against the blob, for `inputs` features and `outputs` corrections. Probes
+    /// are [`Model::from_bytes`](crate::model::Model::from_bytes)' affair.
+    ///
+    /// # Errors
+    /// With the section or value that is wrong.
+    pub fn new(layout: &NetworkLayout, blob: &Blob<'a>, inputs: usize, outputs: usize) -> Result<Self, Refusal> {
+        let mut place = None;
+        Self::load(&mut place, layout, blob, inputs, outputs)?;
+        place.ok_or(Refusal::Card)
+    }
+
     /// Checks shapes and sections against `inputs` features and `outputs` corrections, and makes the network in `place`. After an
     /// error there may be a part of one.
     #[inline(never)]
@@ -92,6 +103,10 @@ impl<'a> Network<'a> {
             blob.floats(layout.input_normalisation, 2 * inputs, "input normalisation")?.split_at(inputs);
         let (output_scale, output_mean) =
             blob.floats(layout.output_normalisation, 2 * outputs, "output normalisation")?.split_at(outputs);
+        ranges::INPUT_MEAN.all(mean)?;
+        ranges::INPUT_SCALE.all(reciprocal_scale)?;
+        ranges::OUTPUT_SCALE.all(output_scale)?;
+        ranges::OUTPUT_MEAN.all(output_mean)?;
         let mut multiply_adds = chained(layout, inputs, outputs)?;
         let skip = if layout.skip.length > 0 {
             multiply_adds += (inputs * outputs) as u32;
@@ -108,9 +123,7 @@ impl<'a> Network<'a> {
                 if !layout.input_code.is_finite() {
                     return Err(Refusal::NotFinite { what: "input code" });
                 }
-                if layout.input_code <= 0.0 {
-                    return Err(Refusal::Value { what: "input code" });
-                }
+                ranges::INPUT_CODE.check(layout.input_code)?;
                 Layers::Integer { code: layout.input_code, layers: heapless::Vec::new() }
             }
         };
@@ -129,28 +142,54 @@ impl<'a> Network<'a> {
     }
 
     /// Evaluates the network: `inputs` in physical units, one for each feature; `outputs` in the units of the corrected channels.
+    /// Inputs that no training has can make an output that is no finite number; [`Job::run`](crate::adapter::Job::run) leaves it
+    /// out.
     /// A scratch of fewer words than [`Network::scratch_words`], or fewer inputs than features, leave `outputs` as they are.
     #[inline]
     pub fn evaluate<const WORDS: usize>(&self, inputs: &[f32], outputs: &mut [f32], scratch: &mut Scratch<WORDS>) {
-        self.run(inputs, outputs, scratch.words());
+        self.run(Some(inputs), outputs, scratch.words());
     }
 
+    /// [`Network::evaluate`] for as many inputs as there are features, which need not lie in an array.
+    pub(crate) fn evaluate_each(&self, inputs: impl Iterator<Item = f32>, outputs: &mut [f32], scratch: &mut Scratch) {
+        let Some((front, back)) = self.halves(scratch.words()) else { return };
+        self.normalise(inputs, self.normalised(front, back));
+        self.run(None, outputs, scratch.words());
+        outputs.iter_mut().for_each(|output| *output = meant(*output));
+    }
+
+    /// The scratch's two parts; `None`: it has too few words.
+    #[inline(always)]
+    fn halves<'s>(&self, scratch: &'s mut [u32]) -> Option<(&'s mut [u32], &'s mut [u32])> {
+        let (front, rest) = scratch.split_at_mut_checked(self.half)?;
+        Some((front, rest.get_mut(..self.half)?))
+    }
+
+    /// The part of the scratch in which the normalised inputs are.
+    #[inline(always)]
+    fn normalised<'s>(&self, front: &'s mut [u32], back: &'s mut [u32]) -> &'s mut [u32] {
+        match &self.layers {
+            Layers::Float(_) => front,
+            Layers::Integer { .. } => back,
+        }
+    }
+
+    /// Evaluates the network; without inputs, those that are in the scratch already, normalised.
     #[inline(never)]
-    fn run(&self, inputs: &[f32], outputs: &mut [f32], scratch: &mut [u32]) {
-        let (Some((front, rest)), Some(inputs)) = (scratch.split_at_mut_checked(self.half), inputs.get(..self.mean.len())) else {
-            return;
-        };
-        let Some(back) = rest.get_mut(..self.half) else { return };
+    fn run(&self, inputs: Option<&[f32]>, outputs: &mut [f32], scratch: &mut [u32]) {
+        let Some((front, back)) = self.halves(scratch) else { return };
+        if let Some(inputs) = inputs {
+            let Some(inputs) = inputs.get(..self.mean.len()) else { return };
+            self.normalise(inputs.iter().copied(), self.normalised(front, back));
+        }
         match &self.layers {
             Layers::Float(layers) => {
-                self.normalise(inputs, front);
                 self.skip(front, outputs);
                 let values = float::outputs(layers, front, back);
                 self.denormalise(values.iter().map(|value| f32::from_bits(*value)), outputs);
             }
             Layers::Integer { code, layers } => {
-                let encoding = integer::Encoding { mean: self.mean, reciprocal_scale: self.reciprocal_scale, code: *code };
-                integer::encode(&encoding, inputs, layers, back, front);
+                integer::encode(*code, self.mean.len(), layers, back, front);
                 self.skip(back, outputs);
                 let sums = integer::sums(layers, front, back).iter().zip(integer::scales(layers));
                 self.denormalise(sums.map(|(sum, scale)| *sum as i32 as f32 * f32::from_le_bytes(*scale)), outputs);
@@ -160,21 +199,26 @@ impl<'a> Network<'a> {
 
     /// Normalises the inputs into `words`, padded with zeros.
     #[inline(always)]
-    fn normalise(&self, inputs: &[f32], words: &mut [u32]) {
+    fn normalise(&self, inputs: impl Iterator<Item = f32>, words: &mut [u32]) {
         let normalisation = self.mean.iter().zip(self.reciprocal_scale.iter());
         for ((word, input), (mean, reciprocal)) in words.iter_mut().zip(inputs).zip(normalisation) {
-            *word = ((*input - mean) * reciprocal).to_bits();
+            *word = ((input - mean) * reciprocal).to_bits();
         }
-        // One is enough: float layers have an even number of inputs.
-        if let Some(word) = words.get_mut(inputs.len()) {
-            *word = 0;
+        let mut padded = self.mean.len();
+        while !padded.is_multiple_of(INPUT_PADDING) {
+            if let Some(word) = words.get_mut(padded) {
+                *word = 0;
+            }
+            padded += 1;
         }
     }
 
     /// Writes the skip's outputs, if there is one.
     #[inline(always)]
     fn skip(&self, normalised: &[u32], outputs: &mut [f32]) {
-        if let Some(skip) = &self.skip {
+        // The rows behind the last output are padding.
+        let count = self.output_scale.len().min(outputs.len());
+        if let (Some(skip), Some(outputs)) = (&self.skip, outputs.get_mut(..count)) {
             skip.outputs(normalised, outputs);
         }
     }
@@ -188,6 +232,11 @@ impl<'a> Network<'a> {
             *output = (skip + value) * scale + mean;
         }
     }
+}
+
+/// An output that is no number, or larger than any that is believed, was not meant: 0.
+pub(crate) fn meant(output: f32) -> f32 {
+    if crate::math::abs(output) <= ranges::MAGNITUDE { output } else { 0.0 }
 }
 
 /// Checks that the layers' shapes follow from each other; gives their number of multiplications.

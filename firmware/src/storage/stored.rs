@@ -5,7 +5,7 @@
 
 use super::{HEADER, Header, Sequence, StorageError};
 use crate::{
-    format::{Refusal, file},
+    format::{Refusal, file, trailer},
     model::Model,
     network::Scratch,
 };
@@ -96,8 +96,22 @@ pub(super) fn examine(
     scratch: &mut Scratch,
     check: impl FnOnce(&Model<'_>) -> Result<(), Refusal>,
 ) -> Result<(), Refusal> {
-    let mut place = Model::EMPTY;
+    let mut place = Model::empty();
     check(Model::load_into(&mut place, file, scratch)?)
+}
+
+/// The highest signed version in two slots, which is the lowest that may be stored; 0 without signed models. Whether their
+/// signatures are right was checked when they were stored.
+///
+/// An upload erases the spare slot first. If the model there was the newest one but does not fly here any more, as after a new
+/// program, its version is forgotten with it: an application that must not go back even then keeps a floor of its own.
+pub fn floor(slots: [&[u8]; 2]) -> u32 {
+    let versions = slots.map(|slot| {
+        let stored = Stored::read(slot).ok()?;
+        let end = HEADER.checked_add(stored.file.len())?.checked_add(trailer::TRAILER)?;
+        trailer::split(slot.get(HEADER..end)?).map(|signed| signed.version)
+    });
+    versions.into_iter().flatten().max().unwrap_or(0)
 }
 
 /// Looks at both slots; `check` says whether a model fits the application (signals, rate, preview). The scratch is for the

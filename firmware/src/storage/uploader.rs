@@ -45,6 +45,8 @@ enum State {
 pub struct Uploader<S> {
     slot: S,
     sequence: Sequence,
+    #[cfg(feature = "signed")]
+    signers: Option<super::Signers<'static>>,
     state: State,
     /// Received and not yet written, behind it erased bytes.
     block: [u8; BLOCK],
@@ -54,10 +56,38 @@ impl<S: Slot> Uploader<S> {
     /// For the spare slot and the number of a [`super::Survey`].
     pub fn new(slot: S, sequence: Sequence) -> Self {
         const { assert!(BLOCK.is_multiple_of(S::WRITE_SIZE), "the flash is written in words that do not make up a header") };
-        Self { slot, sequence, state: State::Idle, block: [0xff; BLOCK] }
+        Self {
+            slot,
+            sequence,
+            #[cfg(feature = "signed")]
+            signers: None,
+            state: State::Idle,
+            block: [0xff; BLOCK],
+        }
     }
 
-    /// Begins the upload of a model of `length` bytes with this check sum ([`Model::checksum`]): erases the slot. Gives the
+    /// From now on only models are stored that one of these keys has signed, with a version not below the floor, which never
+    /// gets lower. An application that never calls this stores unsigned files, and no signed ones. The floor is [`super::floor`]
+    /// of both slots, before they were given away, or higher.
+    #[cfg(feature = "signed")]
+    pub fn require(&mut self, signers: super::Signers<'static>) {
+        let known = self.signers.map_or(0, |signers| signers.floor);
+        self.signers = Some(super::Signers { floor: signers.floor.max(known), ..signers });
+    }
+
+    /// The model file within what was uploaded, if who sent it may.
+    #[cfg(feature = "signed")]
+    fn permitted<'b>(&self, bytes: &'b [u8]) -> Result<&'b [u8], Refusal> {
+        self.signers.map_or(Ok(bytes), |signers| signers.check(bytes))
+    }
+
+    #[cfg(not(feature = "signed"))]
+    fn permitted<'b>(&self, bytes: &'b [u8]) -> Result<&'b [u8], Refusal> {
+        Ok(bytes)
+    }
+
+    /// Begins the upload of a model of `length` bytes with this check sum ([`Model::checksum`]; of a signed model
+    /// [`file::checksum`] of all bytes, the trailer's too): erases the slot. Gives the
     /// offset of the next byte that is expected: if the same upload had begun before, it goes on.
     ///
     /// # Errors
@@ -161,13 +191,15 @@ impl<S: Slot> Uploader<S> {
         check: impl FnOnce(&Model<'_>) -> Result<(), Refusal>,
     ) -> Result<(), StorageError> {
         let slot = self.slot.bytes();
-        let file = slot.get(HEADER..).and_then(|rest| rest.get(..length as usize)).ok_or(StorageError::Length { length })?;
-        let computed = file::checksum(file);
+        let bytes = slot.get(HEADER..).and_then(|rest| rest.get(..length as usize)).ok_or(StorageError::Length { length })?;
+        let computed = file::checksum(bytes);
         if computed != announced {
             return Err(StorageError::Checksum { announced, computed });
         }
+        let file = self.permitted(bytes)?;
         examine(file, scratch, check)?;
-        let header = Header { sequence: self.sequence, length, checksum: announced }.to_bytes();
+        let (length, checksum) = (file.len() as u32, file::checksum(file));
+        let header = Header { sequence: self.sequence, length, checksum }.to_bytes();
         self.slot.write(0, &header).map_err(|error| StorageError::flash(Operation::WriteHeader, &error))?;
         if self.slot.bytes().starts_with(&header) { Ok(()) } else { Err(StorageError::ReadBack) }
     }

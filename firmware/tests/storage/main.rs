@@ -5,4 +5,6 @@ mod models;
 
 mod cuts;
 mod damage;
+#[cfg(feature = "signed")]
+mod signed;
 mod uploads;

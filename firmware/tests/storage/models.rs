@@ -1,6 +1,7 @@
 //! Small models of a cart, and loops for which they are or are not.
 
 use impromptu_firmware::{
+    Cap, Caps,
     adapter::Adapter,
     model::{Channel, Channels, Model, Refusal, file},
     preview::EndRule,
@@ -49,6 +50,9 @@ impl Aligned {
     }
 }
 
+/// A bound wider than any model's.
+const WIDE: Cap = Cap { limit: 1e9, rate: 1e12 };
+
 /// Any loop.
 pub(crate) fn anything(_: &Model<'_>) -> Result<(), Refusal> {
     Ok(())
@@ -58,11 +62,11 @@ pub(crate) fn anything(_: &Model<'_>) -> Result<(), Refusal> {
 pub(crate) fn servo(model: &Model<'_>) -> Result<(), Refusal> {
     let angle = [Channel { name: "angle", unit: "rad", frame: "joint", end: EndRule::Hold }];
     let signals = Channels { desired: &angle, measured: &angle, reference: &angle };
-    Adapter::<1, 1, 1>::new(model, signals, 100.0, PREVIEW).map(drop)
+    Adapter::<1, 1, 1>::new(model, signals, 100.0, &Caps { channels: &[WIDE], sums: &[] }, PREVIEW).map(drop)
 }
 
 /// The cart of all these models.
 pub(crate) fn cart(model: &Model<'_>) -> Result<(), Refusal> {
     let known = Model::from_bytes(FLOAT)?;
-    Adapter::<2, 2, 2>::new(model, &known.card().signals, 100.0, PREVIEW).map(drop)
+    Adapter::<2, 2, 2>::new(model, &known.card().signals, 100.0, &Caps { channels: &[WIDE; 2], sums: &[] }, PREVIEW).map(drop)
 }

@@ -16,7 +16,7 @@ use impromptu_training::{
     derived,
     files::{write_log, write_model_files},
     observer::Observer,
-    recipe::{Recipe, not_negative, positive},
+    recipe::{Recipe, counted, within},
 };
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -31,25 +31,25 @@ pub struct DemoSettings {
     #[garde(skip)]
     pub seed: u64,
     /// Repetitions of training and test, with seeds from `seed` on.
-    #[garde(range(min = 1))]
+    #[garde(custom(within(1.0, 1000.0)))]
     pub seeds: u32,
     /// Vehicles.
-    #[garde(length(min = 1))]
+    #[garde(length(min = 1, max = 64))]
     pub vehicles: Vec<String>,
     /// Position gains.
-    #[garde(length(min = 1))]
+    #[garde(length(min = 1, max = 64))]
     pub gains: Vec<String>,
     /// Conditions.
-    #[garde(length(min = 1))]
+    #[garde(length(min = 1, max = 64))]
     pub conditions: Vec<String>,
     /// Speeds of the test strokes.
-    #[garde(length(min = 1), inner(custom(positive)))]
+    #[garde(length(min = 1, max = 64), inner(custom(within(0.05, 20.0))))]
     pub speeds: Vec<f64>,
     /// Test strokes.
-    #[garde(range(min = 1))]
+    #[garde(custom(counted(1, 10_000)))]
     pub strokes: usize,
     /// Further delay of the whole loop at test time only, ms, flown at the first speed; 0: not flown.
-    #[garde(custom(not_negative))]
+    #[garde(custom(within(0.0, 500.0)))]
     pub extra_delay_ms: f64,
     /// Recipe of the models.
     #[garde(dive)]
@@ -178,7 +178,7 @@ pub fn run(settings: &DemoSettings, observer: &dyn Observer) -> anyhow::Result<R
 /// Every loop that the settings name, with each seed.
 fn cases(settings: &DemoSettings) -> anyhow::Result<Vec<(Loop, u64)>> {
     let mut cases = Vec::new();
-    for seed in (settings.seed..).take(settings.seeds.max(1) as usize) {
+    for seed in (0..u64::from(settings.seeds.max(1))).map(|index| settings.seed.wrapping_add(index)) {
         for vehicle in &settings.vehicles {
             let vehicle = Vehicle::named(vehicle)?;
             for gains in &settings.gains {

@@ -224,6 +224,7 @@ impl<L: Line> Board<L> {
                         self.motors = Some((Tick(motors.tick), motors.command(), reference));
                     }
                     Report::Telemetry(telemetry) => self.telemetry = telemetry,
+                    Report::Inputs(_) => {}
                     Report::Identity(identity) => self.model = Some(identity.model.map(|model| model.checksum)),
                     Report::Acknowledge { sequence, outcome } => {
                         let place = self.awaited.iter().position(|(awaited, _)| *awaited == sequence);

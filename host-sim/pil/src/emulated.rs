@@ -8,7 +8,7 @@ use std::{
 };
 
 use anyhow::{Context as _, Result};
-use tempfile::TempDir;
+use impromptu_files::interruption::TemporaryFolder;
 
 use crate::{
     board::Board,
@@ -25,7 +25,7 @@ const START: Duration = Duration::from_secs(20);
 /// A running emulator; it ends with this value.
 pub struct Emulated {
     child: Child,
-    folder: TempDir,
+    folder: TemporaryFolder,
     elf: PathBuf,
     link: LinkKind,
     shift: u32,
@@ -87,7 +87,7 @@ pub fn connect(
     link: LinkKind,
     shift: u32,
 ) -> Result<(Emulated, Box<dyn Line>), PilError> {
-    let folder = TempDir::new().context("cannot make a folder for the emulator")?;
+    let folder = TemporaryFolder::new().context("cannot make a folder for the emulator")?;
     if let Some(bytes) = model {
         fs::write(folder.path().join(SLOTS[0]), flash::slot(bytes)).context("cannot write the model")?;
     }
@@ -101,7 +101,7 @@ pub fn connect(
 pub fn restart(mut emulated: Emulated) -> Result<(Emulated, Board<Box<dyn Line>>), PilError> {
     let _ = emulated.child.kill();
     let _ = emulated.child.wait();
-    let folder = std::mem::replace(&mut emulated.folder, TempDir::new().context("cannot make a folder")?);
+    let folder = std::mem::replace(&mut emulated.folder, TemporaryFolder::new().context("cannot make a folder")?);
     let link = emulated.link;
     let (emulated, line) = power(folder, emulated.elf.clone(), &[], link, emulated.shift)?;
     Ok((emulated, Board::new(line, link == LinkKind::Lockstep)))
@@ -109,7 +109,7 @@ pub fn restart(mut emulated: Emulated) -> Result<(Emulated, Board<Box<dyn Line>>
 
 /// Starts the emulator in a folder with what its flash holds.
 fn power(
-    folder: TempDir,
+    folder: TemporaryFolder,
     elf: PathBuf,
     further: &[&str],
     link: LinkKind,

@@ -17,6 +17,7 @@
 //! | 1 | `method`, `figure` | the ways of flying that are compared; curves over two axes as data |
 //! | 2 | `results`, `study` | what flights and models came to; what a study found |
 //! | 3 | `summary`, `grid` | flights averaged into rows; findings side by side |
+//! | 4 | `harmless` | results and studies whose texts act on no terminal and no page |
 //! | 4 | `notation`, `cases` | numbers as text; rows and flights grouped by what was flown |
 //! | 5 | `csv`, `table`, `plots` | the table as CSV and on the console; SVG panels |
 //! | 6 | `page` | the HTML page of results, and that of a study |
@@ -29,6 +30,8 @@ pub mod figure;
 #[cfg(test)]
 mod fixture;
 pub mod grid;
+#[cfg(feature = "views")]
+mod harmless;
 mod method;
 #[cfg(feature = "views")]
 mod notation;

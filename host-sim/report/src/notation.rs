@@ -8,6 +8,10 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
         return NOT_AVAILABLE.to_owned();
     }
+    // Hundreds of digits say less than their number.
+    if value.abs() >= 1e15 {
+        return format!("{value:.1e}");
+    }
     let text = format!("{value:.decimals$}");
     match text.strip_prefix('-') {
         Some(digits) if digits.chars().all(|c| matches!(c, '0' | '.')) => digits.to_owned(),

@@ -12,6 +12,7 @@ use std::fmt::Write as _;
 /// The table with its legend, as plain text that ends with a line break.
 #[must_use]
 pub fn console_table(results: &Results) -> String {
+    let results = &results.harmless();
     let cases = Case::group(&results.table);
     let methods = methods(&results.table);
     let mut text = format!("{}\n", results.title);

@@ -3,7 +3,9 @@
 //! *in* CSV with a header, the columns in any order, spaces round the cells ignored; *out* rows of finite numbers; *never* a
 //! refusal that does not name the file and, where there are any, line and column; *source* RFC 4180.
 
-use std::{fs::File, io, path::Path};
+use std::{io, path::Path};
+
+use impromptu_files::reading::{self, Bounded};
 
 /// Why a table cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -36,8 +38,8 @@ pub enum TableError {
         /// What to do.
         advice: &'static str,
     },
-    /// A cell is not a finite number.
-    #[error("{file}, line {line}: `{column}` is `{found}`, not a finite number; drop or repair the row")]
+    /// A cell is not a finite number, or none that the quantity can have.
+    #[error("{file}, line {line}: `{column}` is `{found}`, {why}; drop or repair the row")]
     Cell {
         /// The file.
         file: String,
@@ -47,6 +49,8 @@ pub enum TableError {
         column: String,
         /// The text.
         found: String,
+        /// What is wrong with it.
+        why: String,
     },
 }
 
@@ -60,14 +64,17 @@ pub struct Table<R> {
     reader: csv::Reader<R>,
 }
 
-impl Table<File> {
-    /// Opens a file.
+/// Largest magnitude of a number in a table, in any unit: squares and sums of what is larger leave the numbers.
+const LARGEST: f64 = 1e30;
+
+impl Table<Bounded> {
+    /// Opens a regular file of at most [`reading::TABLE`] bytes.
     ///
     /// # Errors
-    /// If it cannot be opened, or its header cannot be read.
+    /// If it cannot be opened, is none, or its header cannot be read.
     pub fn open(path: &Path) -> Result<Self, TableError> {
         let file = path.display().to_string();
-        match File::open(path) {
+        match reading::open(path, reading::TABLE) {
             Ok(reader) => Self::new(reader, &file),
             Err(source) => Err(TableError::File { file, source }),
         }
@@ -136,13 +143,22 @@ impl Row<'_> {
     /// # Errors
     /// If it is none.
     pub fn number(&self, place: usize) -> Result<f64, TableError> {
+        self.within(place, LARGEST)
+    }
+
+    /// The number at the place of a column, whose magnitude is at most `largest`.
+    ///
+    /// # Errors
+    /// If it is none, or larger.
+    pub fn within(&self, place: usize, largest: f64) -> Result<f64, TableError> {
         let text = self.record.get(place).unwrap_or_default();
-        text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| TableError::Cell {
-            file: self.file.into(),
-            line: self.line(),
-            column: self.header.get(place).unwrap_or_default().into(),
-            found: text.into(),
-        })
+        let why = match text.parse::<f64>() {
+            Ok(value) if value.abs() <= largest => return Ok(value),
+            Ok(value) if value.is_finite() => format!("not a number from -{largest:e} to {largest:e}"),
+            _ => "not a finite number".into(),
+        };
+        let column = self.header.get(place).unwrap_or_default().into();
+        Err(TableError::Cell { file: self.file.into(), line: self.line(), column, found: text.into(), why })
     }
 
     /// The finite numbers at the places of several columns.
@@ -150,9 +166,17 @@ impl Row<'_> {
     /// # Errors
     /// Names the first that is none.
     pub fn numbers<const N: usize>(&self, places: [usize; N]) -> Result<[f64; N], TableError> {
+        self.numbers_within(places, LARGEST)
+    }
+
+    /// The same with magnitudes of at most `largest`.
+    ///
+    /// # Errors
+    /// Names the first that is none, or larger.
+    pub fn numbers_within<const N: usize>(&self, places: [usize; N], largest: f64) -> Result<[f64; N], TableError> {
         let mut numbers = [0.0; N];
         for (number, place) in numbers.iter_mut().zip(places) {
-            *number = self.number(place)?;
+            *number = self.within(place, largest)?;
         }
         Ok(numbers)
     }
@@ -181,6 +205,10 @@ mod tests {
         for cell in ["", "north", "nan", "inf"] {
             let text = format!("a,b\n1,2\n3,{cell}\n");
             assert_eq!(refusal(&text), format!("t.csv, line 3: `b` is `{cell}`, not a finite number; drop or repair the row"));
+        }
+        for cell in ["1e31", "-1e308"] {
+            let why = format!("t.csv, line 2: `b` is `{cell}`, not a number from -1e30 to 1e30; drop or repair the row");
+            assert_eq!(refusal(&format!("a,b\n1,{cell}\n")), why);
         }
         let ragged = refusal("a,b\n1,2\n3\n");
         assert!(ragged.starts_with("t.csv: ") && ragged.contains("line: 3"), "{ragged}");

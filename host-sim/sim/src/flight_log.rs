@@ -93,6 +93,10 @@ pub enum LogError {
 
 /// Longest time without a row, s.
 const LONGEST_GAP: f64 = 0.1;
+/// Farthest position, m: a map's grid has coordinates of ten thousand kilometres.
+const FARTHEST: f64 = 1e8;
+/// Fastest and hardest that a vehicle moves or is asked to, m/s and m/s².
+const FASTEST: f64 = 1e4;
 /// Fewest rows of a log.
 const FEWEST_ROWS: usize = 50;
 
@@ -194,17 +198,17 @@ impl FlightLog {
             let row = LogRow {
                 time: cells.number(time)?,
                 desired: Sample {
-                    position: cells.numbers(position)?,
-                    velocity: cells.numbers(velocity)?,
-                    acceleration: acceleration.map_or(Ok([0.0; 3]), |places| cells.numbers(places))?,
-                    yaw: yaw.map_or(Ok(0.0), |place| cells.number(place))?,
+                    position: cells.numbers_within(position, FARTHEST)?,
+                    velocity: cells.numbers_within(velocity, FASTEST)?,
+                    acceleration: acceleration.map_or(Ok([0.0; 3]), |places| cells.numbers_within(places, FASTEST))?,
+                    yaw: yaw.map_or(Ok(0.0), |place| cells.within(place, FASTEST))?,
                 },
-                reference_position: cells.numbers(reference_position)?,
-                reference_velocity: cells.numbers(reference_velocity)?,
-                measured_position: cells.numbers(measured_position)?,
-                measured_velocity: cells.numbers(measured_velocity)?,
+                reference_position: cells.numbers_within(reference_position, FARTHEST)?,
+                reference_velocity: cells.numbers_within(reference_velocity, FASTEST)?,
+                measured_position: cells.numbers_within(measured_position, FARTHEST)?,
+                measured_velocity: cells.numbers_within(measured_velocity, FASTEST)?,
                 measured_body: None,
-                true_position: truth.map(|places| cells.numbers(places)).transpose()?,
+                true_position: truth.map(|places| cells.numbers_within(places, FARTHEST)).transpose()?,
             };
             if let Some(previous) = rows.last() {
                 let gap = row.time - previous.time;

@@ -6,7 +6,11 @@ use impromptu_sim::{flight_log::FlightLog, rollout::Dither};
 use impromptu_training::{FlightSet, Purpose, Recipe, Signal, files::write_log, observer::Observer as _};
 use serde::Serialize;
 
-use super::{Invocation, output::table, situation::Situation};
+use super::{
+    Invocation,
+    output::table,
+    situation::{Situation, within},
+};
 
 /// Flights of each kind unless told otherwise: the recipe's hundreds would be half a gigabyte of text.
 const FLIGHTS: u32 = 20;
@@ -60,7 +64,7 @@ impl SignalName {
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|value| (6.0..=3590.0).contains(value)).ok_or_else(|| "expected a number from 6 to 3590".into())
+    within(text, 6.0, 3590.0)
 }
 
 fn metres(text: &str) -> Result<f64, String> {
@@ -102,6 +106,7 @@ impl Collect {
                 let kind = name(flight_set.signal);
                 let dithered = if dither.is_some() { "-dithered" } else { "" };
                 let file = folder.join(format!("{index}-{kind}{dithered}-{flight:04}.csv"));
+                invocation.check_output(&file, self.situation.files())?;
                 write_log(log, &file)?;
                 logs.push(entry(log, file.display().to_string()));
             }

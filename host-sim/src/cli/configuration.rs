@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, anyhow};
 use garde::Validate;
 use impromptu_experiment::demo::DemoSettings;
+use impromptu_files::reading;
 use impromptu_training::{Purpose, Recipe, derived};
 use serde::de::DeserializeOwned;
 
@@ -56,7 +57,7 @@ pub(super) fn checked<T: DeserializeOwned + Validate<Context = ()>>(path: &Path)
 
 /// Reads a TOML file; refusals name file, line and key.
 pub(super) fn toml<T: DeserializeOwned>(path: &Path) -> Result<T> {
-    let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+    let text = reading::read_text(path, reading::SETTINGS).with_context(|| path.display().to_string())?;
     toml::from_str(&text).map_err(|error: toml::de::Error| {
         let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
         let line = 1 + before.matches('\n').count();
@@ -84,6 +85,9 @@ mod tests {
         let file = folder.path().join("demo.toml");
         for (text, key) in [
             ("strokes = 0", "strokes"),
+            ("strokes = 1000000000000", "strokes"),
+            ("extra_delay_ms = 1e12", "extra_delay_ms"),
+            ("[recipe.network]\nhidden = [1000000]", "recipe.network"),
             ("speeds = [1.0, -1.0]", "speeds[1]"),
             ("speeds = []", "speeds"),
             ("[recipe]\ndivisor = 0", "recipe.divisor"),

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use anyhow::{Context as _, Result, bail};
 use clap::{Args, ValueEnum};
 use impromptu_diagnosis::{Diagnosis, DiagnosisError, Record, Settings, diagnose};
+use impromptu_files::text::line;
 use impromptu_sim::{
     flight_log::FlightLog,
     flights::Loop,
@@ -26,7 +27,7 @@ use serde::Serialize;
 
 use super::{
     Invocation,
-    situation::{closed_loop, milliseconds},
+    situation::{closed_loop, hertz, milliseconds},
 };
 
 /// Arguments of `diagnose`.
@@ -76,7 +77,7 @@ pub(super) struct Diagnose {
     #[arg(long, value_name = "N", value_parser = milliseconds)]
     delay_ms: Option<f64>,
     /// Rate of the add-on, Hz: that of which the relative degree is meant; chosen from the band of the log if not given.
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", value_parser = hertz)]
     sub_rate: Option<f64>,
 }
 
@@ -268,12 +269,12 @@ fn steps(rate_hz: f64, seed: u64) -> Trajectory {
 }
 
 fn text(diagnosed: &Diagnosed) -> String {
-    let mut text = format!("{}; seed {}\n", diagnosed.source, diagnosed.seed);
+    let mut text = format!("{}; seed {}\n", line(&diagnosed.source), diagnosed.seed);
     for Found { name, unit, diagnosis, .. } in &diagnosed.channels {
-        text += &format!("\n{name}\n{}", diagnosis.text(unit));
+        text += &format!("\n{}\n{}", line(name), diagnosis.text(unit));
     }
     for Refused { name, why } in &diagnosed.refused {
-        text += &format!("\n{name}\nnot diagnosed: {why}\n");
+        text += &format!("\n{}\nnot diagnosed: {}\n", line(name), line(why));
     }
     text
 }

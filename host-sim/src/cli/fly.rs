@@ -1,10 +1,14 @@
 //! `host-sim fly`: one trajectory, with and without the add-on.
 
-use std::{collections::BTreeMap, path::PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use anyhow::{Context as _, Result, bail};
 use clap::{Args, ValueEnum};
 use impromptu_experiment::evaluation::per_flight;
+use impromptu_files::text::line;
 use impromptu_firmware::{
     adapter::Lanes,
     guard::{Trip, Trips},
@@ -126,6 +130,10 @@ impl Tripped {
 
 impl Fly {
     pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
+        if let Some(log) = &self.log {
+            let inputs = self.model.as_deref().into_iter().chain(self.trajectory.as_deref().map(Path::new));
+            invocation.check_output(log, inputs.chain(self.situation.files()))?;
+        }
         let closed_loop = self.situation.closed_loop()?.delayed(self.extra_delay_ms / 1e3);
         let trajectory = match &self.trajectory {
             Some(name) => Some(trajectory::find(name)?.scaled(self.speed).sampled(closed_loop.rate_hz())?),
@@ -191,7 +199,7 @@ impl Fly {
     }
 }
 
-fn write_last(records: &[FlightRecord], path: &std::path::Path) -> Result<()> {
+fn write_last(records: &[FlightRecord], path: &Path) -> Result<()> {
     let Some(log) = records.last().and_then(|record| record.log.as_ref()) else { return Ok(()) };
     let finite = |row: &impromptu_sim::flight_log::LogRow| {
         row.measured_position.iter().chain(&row.true_position.unwrap_or_default()).all(|x| x.is_finite())
@@ -211,7 +219,9 @@ fn text(flown: &Flown) -> String {
         ]
     });
     let head = flown.flights.first().map_or_else(String::new, |flight| {
-        format!("{} at {}x speed: {} {} {}\n", flight.trajectory, flight.speed, flight.vehicle, flight.gains, flight.condition)
+        let text =
+            format!("{} at {}x speed: {} {} {}", flight.trajectory, flight.speed, flight.vehicle, flight.gains, flight.condition);
+        line(&text).into_owned() + "\n"
     });
     head + &table(["method", "RMS error, cm", "reduction, %"], 1, rows)
         + &flown.trips.as_ref().map_or_else(String::new, Tripped::text)

@@ -22,12 +22,13 @@ mod trajectory;
 use std::{
     ffi::OsString,
     io::{ErrorKind, Write as _},
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::ExitCode,
 };
 
-use anyhow::Result;
+use anyhow::{Context as _, Result};
 use clap::{Args, Parser, Subcommand};
+use impromptu_files::{place, text::line};
 
 use self::{configuration::Configuration, output::Format, progress::Console};
 
@@ -115,6 +116,17 @@ struct Invocation {
     console: Console,
     /// The command that repeats the run.
     command: String,
+    /// The file of the configuration, if there is one.
+    config: Option<PathBuf>,
+}
+
+impl Invocation {
+    /// Refuses an output that cannot be written, or that is one of the inputs by whatever name. Asked before minutes of work;
+    /// a vehicle or condition of the program's own is no file and cannot be one.
+    fn check_output<'a>(&'a self, output: &Path, inputs: impl IntoIterator<Item = &'a Path>) -> Result<()> {
+        let inputs = inputs.into_iter().chain(self.config.as_deref());
+        place::check(output).and_then(|()| place::apart(output, inputs)).with_context(|| output.display().to_string())
+    }
 }
 
 /// Runs the program; the first of the arguments is its name.
@@ -140,7 +152,7 @@ where
         }
         Err(error) => {
             // Nothing can be done if even that cannot be written.
-            let _ = writeln!(std::io::stderr(), "error: {}", message(&error));
+            let _ = writeln!(std::io::stderr(), "error: {}", line(&message(&error)));
             ExitCode::from(FAILED)
         }
     }
@@ -168,7 +180,7 @@ fn repeated(words: &[OsString]) -> String {
 fn execute(arguments: Arguments, console: &Console, command: String) -> Result<()> {
     let Global { config, seed, out, format, .. } = arguments.global;
     let configuration = Configuration::load(config.as_deref(), seed, out)?;
-    let invocation = Invocation { configuration, format, console: console.clone(), command };
+    let invocation = Invocation { configuration, format, console: console.clone(), command, config };
     match arguments.command {
         None => demo::run(&invocation),
         Some(Command::Collect(command)) => command.run(&invocation),

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
+use impromptu_files::reading;
 use impromptu_firmware::{
     adapter::Lanes,
     features::{Relative, Source},
@@ -20,7 +21,7 @@ pub(super) struct ModelFile {
 
 impl ModelFile {
     pub(super) fn read(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).with_context(|| path.display().to_string())?;
+        let bytes = reading::read(path, reading::DOCUMENT).with_context(|| path.display().to_string())?;
         Ok(Self { path: path.to_owned(), bytes })
     }
 

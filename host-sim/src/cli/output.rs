@@ -5,7 +5,10 @@ use std::{io::Write as _, path::Path};
 use anyhow::{Context as _, Result};
 use clap::ValueEnum;
 use comfy_table::{Cell, CellAlignment, LineStyle, Table, presets};
-use impromptu_model_export::replacement::replace;
+use impromptu_files::{
+    replacement::{replace, replace_all},
+    text::{json, line, lines},
+};
 use serde::Serialize;
 
 /// How results are printed.
@@ -23,13 +26,22 @@ impl Format {
     pub(super) fn print(self, result: &impl Serialize, text: impl FnOnce() -> String) -> Result<()> {
         match self {
             Self::Table => print(&text()),
-            Self::Json => print(&(serde_json::to_string_pretty(result)? + "\n")),
+            Self::Json => print_json(&(serde_json::to_string_pretty(result)? + "\n")),
         }
     }
 }
 
-/// Writes to stdout.
+/// Writes a text to stdout; what would act on a terminal is written out.
 pub(super) fn print(text: &str) -> Result<()> {
+    pour(&lines(text))
+}
+
+/// The same of a JSON document, which means the same to whoever parses it.
+pub(super) fn print_json(document: &str) -> Result<()> {
+    pour(&json(document))
+}
+
+fn pour(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
     out.write_all(text.as_bytes())?;
     Ok(out.flush()?)
@@ -40,12 +52,17 @@ pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     replace(path, bytes).with_context(|| format!("{}: cannot be written", path.display()))
 }
 
-/// A table of text; all columns but the first `left` ones are set right, as numbers are.
-pub(super) fn table<const N: usize>(header: [&str; N], left: usize, rows: impl IntoIterator<Item = [String; N]>) -> String {
-    table_of(header.map(str::to_owned), left, rows)
+/// Writes files, all of them or none.
+pub(super) fn write_all(files: &[(&Path, &[u8])]) -> Result<()> {
+    Ok(replace_all(files)?)
 }
 
-/// The same with as many columns as the header has.
+/// A table of text, a line a row; all columns but the first `left` ones are set right, as numbers are.
+pub(super) fn table<const N: usize>(header: [&str; N], left: usize, rows: impl IntoIterator<Item = [String; N]>) -> String {
+    table_of(header.map(str::to_owned), left, rows.into_iter().map(|row| row.map(|cell| line(&cell).into_owned())))
+}
+
+/// The same with as many columns as the header has; cells may have several lines.
 pub(super) fn table_of<R: IntoIterator<Item = String>>(
     header: impl IntoIterator<Item = String>,
     left: usize,

@@ -6,6 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use impromptu_files::text::line;
 use impromptu_training::observer::Observer;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -42,7 +43,7 @@ impl Console {
         }
         let print = || {
             // A closed stderr is no reason to stop.
-            let _ = writeln!(std::io::stderr(), "{text}");
+            let _ = writeln!(std::io::stderr(), "{}", line(text));
         };
         match &self.bar {
             Some(bar) => bar.suspend(print),

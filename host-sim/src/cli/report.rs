@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, Result};
 use clap::Args;
+use impromptu_files::reading;
 use impromptu_report::Results;
 
 use super::{Invocation, demo};
@@ -24,8 +25,12 @@ pub(super) struct Report {
 impl Report {
     pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
         let name = self.results.display();
-        let text = std::fs::read_to_string(&self.results).with_context(|| name.to_string())?;
+        let text = reading::read_text(&self.results, reading::DOCUMENT).with_context(|| name.to_string())?;
         let results = Results::from_json(&text).with_context(|| name.to_string())?;
-        demo::show(invocation, &results, &invocation.configuration.folder()?)
+        let folder = invocation.configuration.folder()?;
+        for view in demo::VIEWS {
+            invocation.check_output(&folder.join(view), [self.results.as_path()])?;
+        }
+        demo::show(invocation, &results, &folder)
     }
 }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
+use impromptu_files::reading;
 use impromptu_sim::{condition::Condition, flights::Loop, plant::Vehicle};
 
 use super::configuration::toml;
@@ -23,6 +24,11 @@ pub(super) struct Situation {
 }
 
 impl Situation {
+    /// The files among them: inputs that no output may replace.
+    pub(super) fn files(&self) -> [&Path; 2] {
+        [Path::new(&self.vehicle), Path::new(&self.condition)]
+    }
+
     /// The loop that is flown.
     pub(super) fn closed_loop(&self) -> Result<Loop> {
         closed_loop(&self.vehicle, &self.gains, &self.condition)
@@ -38,14 +44,18 @@ fn find_vehicle(name: &str) -> Result<Vehicle> {
     if !name.ends_with(".toml") {
         return Vehicle::named(name).context("--vehicle");
     }
-    let text = std::fs::read_to_string(name).with_context(|| format!("--vehicle {name}"))?;
+    let text = reading::read_text(Path::new(name), reading::SETTINGS).with_context(|| format!("--vehicle {name}"))?;
     Vehicle::from_toml(&text).with_context(|| format!("--vehicle {name}"))
 }
 
 fn find_condition(name: &str) -> Result<Condition> {
     match Condition::named(name) {
         Some(condition) => Ok(condition),
-        None if name.ends_with(".toml") => toml(Path::new(name)).context("--condition"),
+        None if name.ends_with(".toml") => {
+            let condition: Condition = toml(Path::new(name)).context("--condition")?;
+            condition.check().with_context(|| format!("--condition {name}"))?;
+            Ok(condition)
+        }
         None => bail!("--condition: no condition is named `{name}`; known names: {}", Condition::NAMES.join(", ")),
     }
 }
@@ -60,7 +70,13 @@ pub(super) fn milliseconds(text: &str) -> Result<f64, String> {
     within(text, 0.0, 500.0)
 }
 
-fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
+/// A rate in Hz.
+pub(super) fn hertz(text: &str) -> Result<f64, String> {
+    within(text, 1e-6, 1e6)
+}
+
+/// From where to where a number given as an argument may be.
+pub(super) fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
     match text.parse() {
         Ok(value) if (low..=high).contains(&value) => Ok(value),
         _ => Err(format!("expected a number from {low} to {high}")),

@@ -59,15 +59,20 @@ impl Study {
 #[derive(Debug, Args)]
 struct Lti {
     /// Networks trained for each system and feature set; the best in the f32 kernel is kept.
-    #[arg(long, default_value_t = lti::Settings::default().learning.restarts)]
+    #[arg(long, default_value_t = lti::Settings::default().learning.restarts, value_parser = count::<1000>)]
     restarts: usize,
     /// Most steps of Levenberg-Marquardt.
-    #[arg(long, default_value_t = lti::Settings::default().learning.training.iterations)]
+    #[arg(long, default_value_t = lti::Settings::default().learning.training.iterations, value_parser = count::<100_000>)]
     iterations: usize,
     /// Folder of flight logs (CSV with px, py, sp_ctrltarget_x, sp_ctrltarget_y in m, every 40 ms; FAMILY_NUMBER_….csv) instead
     /// of those in the program.
     #[arg(long, value_name = "DIR")]
     logs: Option<std::path::PathBuf>,
+}
+
+/// A count from 1 to `MOST`.
+fn count<const MOST: usize>(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|value| (1..=MOST).contains(value)).ok_or_else(|| format!("expected a number from 1 to {MOST}"))
 }
 
 impl Lti {

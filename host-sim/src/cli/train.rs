@@ -4,13 +4,14 @@ mod columns;
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result, anyhow, bail};
 use clap::Args;
+use impromptu_files::name::plain;
 use impromptu_flight::flight::Rates;
 use impromptu_sim::{flight_log::FlightLog, flights::Loop};
 use impromptu_training::{
-    AxisGates, LearnSettings, Pipeline, Recipe, Trained, Validation, check_gates, in_words, observer::Observer as _, smoothing,
-    supervised::Progress, write_model_files,
+    AxisGates, LearnError, LearnSettings, Learned, Pipeline, Recipe, Trained, Validation, check_gates, files::model_files,
+    in_words, learn::few_rows, observer::Observer as _, smoothing, supervised::Progress, write_model_files,
 };
 use serde::Serialize;
 
@@ -49,7 +50,7 @@ pub(super) struct Train {
     /// Name of the model and of its files.
     #[arg(long, default_value = "model", value_parser = file_name)]
     name: String,
-    /// Train although a gate of `diagnose` failed; the model's remarks say so.
+    /// Train although a gate of `diagnose` failed or the rows are too few; the model's remarks say so.
     #[arg(long)]
     force: bool,
     /// Recipe as TOML, in the place of the configuration's `[recipe]`.
@@ -58,8 +59,8 @@ pub(super) struct Train {
 }
 
 fn file_name(text: &str) -> Result<String, String> {
-    let plain = Path::new(text).file_name().is_some_and(|name| name == text) && text.len() <= 64;
-    if plain { Ok(text.to_owned()) } else { Err("expected a file name without folders, at most 64 bytes long".into()) }
+    let name = plain(text).map_err(|error| error.to_string())?;
+    if name.len() <= 64 { Ok(name.to_owned()) } else { Err("expected a file name without folders, at most 64 bytes long".into()) }
 }
 
 /// What is printed as JSON.
@@ -112,18 +113,23 @@ impl Train {
         invocation.console.note(&format!("seed {seed}"));
         let gates = self.pass_gates(invocation, &logs, origin.delay_s, seed)?;
         let folder = invocation.configuration.folder()?;
+        self.check_outputs(invocation, &folder)?;
 
         invocation.console.stage(&format!("training on {} logs", logs.len()));
-        let pipeline = origin.pipeline(&recipe, seed)?;
-        let learned = pipeline.learn(&logs, &mut watched(invocation, &recipe))?;
+        let pipeline = origin.pipeline(&recipe, seed, self.force)?;
+        let learned = pipeline.learn(&logs, &mut watched(invocation, &recipe)).map_err(|error| match error {
+            few @ LearnError::FewRows { .. } => anyhow!("--log: {few}; --force trains all the same, and the model says so"),
+            other => anyhow::Error::new(other).context("--log"),
+        })?;
         invocation.console.finish();
         for log in &learned.broken {
             let error = log.largest_error;
             invocation.console.note(&format!("{}: left out, its loop broke down (largest error {error:.2} m)", log.name));
         }
         invocation.console.stage("designing the feedback lane");
+        let overridden = self.overridden(invocation, &recipe, &learned, gates.overridden, rate_hz);
         let identification = if dithered.is_empty() { &logs } else { &dithered };
-        let trained = pipeline.complete(&learned, identification, &self.name, gates.overridden.as_deref())?;
+        let trained = pipeline.complete(&learned, identification, &self.name, overridden.as_deref())?;
         let Trained { lane, description, model } = trained;
         invocation.console.note(&in_words(&lane));
         let (design, refusal) = match lane {
@@ -140,10 +146,38 @@ impl Train {
             feedback_lane: design,
             refusal,
             gates: gates.axes,
-            overridden: gates.overridden,
+            overridden,
             files,
         };
         invocation.format.print(&trained, || text(&trained))
+    }
+
+    /// Every file that is written must be writable, and none of those that are read.
+    fn check_outputs(&self, invocation: &Invocation, folder: &Path) -> Result<()> {
+        let named = [self.vehicle.as_deref(), Some(&self.condition)].into_iter().flatten().map(Path::new);
+        let read = || self.log.iter().chain(&self.dithered).chain(&self.recipe).map(PathBuf::as_path);
+        for output in model_files(folder, &self.name)? {
+            invocation.check_output(&output, read().chain(named.clone()))?;
+        }
+        Ok(())
+    }
+
+    /// What --force overrode, rows that are too few among it.
+    fn overridden(
+        &self,
+        invocation: &Invocation,
+        recipe: &Recipe,
+        learned: &Learned,
+        gates: Option<String>,
+        rate_hz: f64,
+    ) -> Option<String> {
+        let few = few_rows(recipe, learned.rows.count, learned.held_out, rate_hz);
+        let few = few.map(|few| format!("rows overridden by --force: {few}"));
+        if let Some(few) = &few {
+            invocation.console.note(&format!("warning: {few}"));
+        }
+        let all: Vec<String> = gates.into_iter().chain(few).collect();
+        (!all.is_empty()).then(|| all.join("; "))
     }
 
     /// The gates of `diagnose`: the recipe's features are relative to now, so the gain has to be one as well.
@@ -185,7 +219,7 @@ impl Train {
 
 impl Origin {
     /// The training of these logs: judged in flight if there is a simulated loop.
-    fn pipeline(&self, recipe: &Recipe, seed: u64) -> Result<Pipeline<'_>> {
+    fn pipeline(&self, recipe: &Recipe, seed: u64, keep_few: bool) -> Result<Pipeline<'_>> {
         let validation = self
             .closed_loop
             .as_ref()
@@ -194,6 +228,7 @@ impl Origin {
             settings: LearnSettings {
                 measurement_delay_s: self.delay_s,
                 smoothing_s: self.smoothing_s,
+                keep_few,
                 ..LearnSettings::new(recipe, seed)
             },
             template: &self.template,

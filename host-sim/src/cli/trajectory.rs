@@ -41,6 +41,9 @@ impl TrajectoryCommand {
         let Some(name) = self.trajectory else {
             return invocation.format.print(&KNOWN_NAMES, || KNOWN_NAMES.join("\n") + "\n");
         };
+        if let Some(file) = &self.output {
+            invocation.check_output(file, [Path::new(&name)])?;
+        }
         let trajectory = find(&name)?.scaled(self.speed).sampled(DEFAULT_RATE_HZ)?;
         let mut text = String::from("t,x,y,z,yaw\n");
         for (tick, sample) in trajectory.samples[trajectory.scored.clone()].iter().enumerate() {

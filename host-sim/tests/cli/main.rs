@@ -2,6 +2,8 @@
 
 mod demo;
 mod diagnose;
+#[cfg(unix)]
+mod files;
 mod program;
 mod refusals;
 mod steps;

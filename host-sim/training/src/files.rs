@@ -3,10 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
+use impromptu_files::{
+    name::plain,
+    replacement::{replace, replace_all},
+};
 use impromptu_firmware::features::{Feature, Relative, Source};
 use impromptu_model_export::{
     Description,
-    description::{ChannelDescription, Signals},
+    description::{ChannelDescription, Signals, Tie},
 };
 
 use impromptu_sim::{
@@ -23,10 +27,14 @@ use crate::learn::Learned;
 pub fn write_log(log: &FlightLog, path: &Path) -> Result<(), LogError> {
     let file = path.display().to_string();
     let bytes = log.to_csv(&file)?;
-    impromptu_model_export::replacement::replace(path, &bytes).map_err(|source| TableError::File { file, source }.into())
+    replace(path, &bytes).map_err(|source| TableError::File { file, source }.into())
 }
 
-/// Writes network, description, calibration rows and model, each replaced whole and only when all bytes are made.
+/// Endings of the files of a model, in the order in which they take their places: the model last.
+pub const ENDINGS: [&str; 4] = ["safetensors", "json", "rows.csv", "impromptu"];
+
+/// Writes network, description, calibration rows and model: all of them, or what was there stays. The description says which
+/// network and rows it belongs to, so that who reads a set that a power cut has mixed can tell.
 ///
 /// # Errors
 /// Names the file that cannot be written.
@@ -39,17 +47,21 @@ pub fn write_model_files(
 ) -> Result<Vec<PathBuf>> {
     let network = learned.exported.to_bytes().context("network")?;
     let rows = rows(learned, description)?;
-    let description = description.to_json();
-    let contents: [(&str, &[u8]); 4] =
-        [("safetensors", &network), ("json", description.as_bytes()), ("rows.csv", &rows), ("impromptu", model)];
-    let mut written = Vec::new();
-    for (extension, bytes) in contents {
-        let path = folder.join(format!("{name}.{extension}"));
-        impromptu_model_export::replacement::replace(&path, bytes)
-            .with_context(|| format!("{}: cannot be written", path.display()))?;
-        written.push(path);
-    }
-    Ok(written)
+    let tie = Tie::of(&learned.exported, &learned.rows.calibration);
+    let description = Description { tie: Some(tie), ..description.clone() }.to_json();
+    let paths = model_files(folder, name)?;
+    let contents: [&[u8]; 4] = [&network, description.as_bytes(), &rows, model];
+    replace_all(&paths.iter().zip(contents).collect::<Vec<_>>())?;
+    Ok(paths)
+}
+
+/// Where the files of a model are, in the order of [`ENDINGS`].
+///
+/// # Errors
+/// If the name is no plain file name.
+pub fn model_files(folder: &Path, name: &str) -> Result<Vec<PathBuf>> {
+    let name = plain(name)?;
+    Ok(ENDINGS.iter().map(|ending| folder.join(format!("{name}.{ending}"))).collect())
 }
 
 /// The calibration rows, a column for each feature.

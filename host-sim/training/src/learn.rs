@@ -34,6 +34,27 @@ pub enum LearnError {
     /// The recipe asks for no network.
     #[error("recipe: `weight_decays` and `shares` name no candidate; give at least one of each")]
     NoCandidate,
+    /// Too few rows for what shall be learned from them.
+    #[error(
+        "{found} rows to train on and {held_out} held out are too few for {features} features and {parameters} parameters: \
+         {needed} and {needed_held_out} are needed; log about {seconds:.0} s more, or train a smaller network on fewer features"
+    )]
+    FewRows {
+        /// Rows to train on.
+        found: usize,
+        /// Rows held out.
+        held_out: usize,
+        /// Inputs of the network.
+        features: usize,
+        /// Weights and biases of the network.
+        parameters: usize,
+        /// Rows to train on that are needed.
+        needed: usize,
+        /// Rows held out that are needed.
+        needed_held_out: usize,
+        /// Further flight that gives what is missing, s.
+        seconds: f64,
+    },
     /// Too few logs.
     #[error("at least two logs in which the loop did not break down are needed: one is kept to decide when to stop training")]
     OneLog,
@@ -52,6 +73,8 @@ pub struct LearnSettings {
     pub precision: Precision,
     /// Whether logs in which the loop broke down are used as well.
     pub keep_broken: bool,
+    /// Whether fewer rows than [`LearnError::FewRows`] asks for are enough.
+    pub keep_few: bool,
     /// Age of the logged measurements, s.
     pub measurement_delay_s: f64,
     /// Zero-phase smoothing of the logs, s.
@@ -69,6 +92,7 @@ impl LearnSettings {
             labels: Labels::Corrections,
             precision: Precision::Int8,
             keep_broken: false,
+            keep_few: true,
             measurement_delay_s: 0.0,
             smoothing_s: 0.0,
         }
@@ -90,6 +114,8 @@ pub struct Learned {
     pub precision: Precision,
     /// What a description needs of the training rows.
     pub rows: Rows,
+    /// Rows held out.
+    pub held_out: usize,
     /// Coefficient of determination R² of the network over the position labels of the logs held out.
     pub determination: f64,
     /// Logs that were left out.
@@ -192,6 +218,11 @@ pub fn learn(
     };
     let (training, held_out) = split(&logs);
     let (training, validation) = (examples(&training)?, examples(&held_out)?);
+    if !settings.keep_few
+        && let Some(few) = few_rows(recipe, training.rows(), validation.rows(), logs[0].rate_hz)
+    {
+        return Err(few);
+    }
     let rows = Rows::of(&training);
     let ridge = Ridge::fit(&training, recipe.ridge_penalty)?.to_network();
     let mut candidates = Vec::new();
@@ -220,7 +251,30 @@ pub fn learn(
         }
     };
     let determination = determination(&network, &validation);
-    Ok(Learned { labels, ridge, network, exported, precision, rows, determination, broken })
+    let held_out = validation.rows();
+    Ok(Learned { labels, ridge, network, exported, precision, rows, held_out, determination, broken })
+}
+
+/// Rows for each coefficient of the linear map: with fewer its noise is that of the rows.
+const ROWS_A_COEFFICIENT: usize = 10;
+
+/// Whether a training set is too small: for each coefficient of the linear map ten rows, for each weight of the network a label,
+/// and held out as many rows as the linear map has coefficients.
+pub fn few_rows(recipe: &Recipe, found: usize, held_out: usize, rate_hz: f64) -> Option<LearnError> {
+    let features = recipe.features().len();
+    let widths: Vec<usize> = [features].into_iter().chain(recipe.network.hidden.iter().copied()).chain([REFERENCE]).collect();
+    let parameters = widths.windows(2).map(|pair| (pair[0] + 1) * pair[1]).sum::<usize>();
+    let (needed, needed_held_out) = ((ROWS_A_COEFFICIENT * (features + 1)).max(parameters.div_ceil(REFERENCE)), features + 1);
+    let missing = needed.saturating_sub(found) + needed_held_out.saturating_sub(held_out);
+    (missing > 0).then(|| LearnError::FewRows {
+        found,
+        held_out,
+        features,
+        parameters,
+        needed,
+        needed_held_out,
+        seconds: (missing * recipe.stride) as f64 / rate_hz,
+    })
 }
 
 /// R² over the position labels.

@@ -71,6 +71,7 @@ pub fn describe(
         envelope: rows.envelope.clone(),
         feedback_lane: lane.cloned(),
         monitor: None,
+        tie: None,
     }
 }
 

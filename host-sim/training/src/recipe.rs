@@ -5,7 +5,7 @@ use impromptu_firmware::{
     features::{Feature, window},
     model::Interpolation,
 };
-use impromptu_flight::flight::PREVIEW;
+use impromptu_flight::{flight::PREVIEW, quadrotor::REFERENCE};
 use impromptu_sim::trajectory::{
     Motion, MultisineSettings, STROKE_ACCELERATION, STROKE_SPEED, SplineSettings, multisine, random_spline, stroke,
 };
@@ -36,19 +36,19 @@ pub struct FlightSet {
     #[garde(skip)]
     pub signal: Signal,
     /// Number of flights, each with its own seed.
-    #[garde(range(min = 1))]
+    #[garde(custom(within(1.0, 3000.0)))]
     pub flights: u32,
     /// Length of each, s (multisine and spline).
-    #[garde(custom(not_negative))]
+    #[garde(custom(length_of(self.signal, self.flights)))]
     pub seconds: f64,
     /// Peak speed, m/s.
-    #[garde(custom(positive))]
+    #[garde(custom(within(0.01, 50.0)))]
     pub max_speed: f64,
     /// Peak acceleration, m/s²; that of strokes follows from the speed.
-    #[garde(custom(positive))]
+    #[garde(custom(within(0.01, 200.0)))]
     pub max_acceleration: f64,
     /// Shortest period of a multisine, time between the points of a spline, s.
-    #[garde(custom(not_negative))]
+    #[garde(custom(shortest_of(self.signal)))]
     pub shortest_s: f64,
 }
 
@@ -91,38 +91,38 @@ pub struct LaneRecipe {
     #[serde(alias = "excitation")]
     pub dithered_flights: FlightSet,
     /// Amplitude of the dither, m.
-    #[garde(custom(positive))]
+    #[garde(custom(within(1e-5, 1.0)))]
     pub dither: f64,
     /// Time between new signs of the dither, s.
-    #[garde(custom(positive))]
+    #[garde(custom(within(1e-3, 10.0)))]
     pub dither_hold_s: f64,
     /// Control weights of the design tried.
-    #[garde(length(min = 1), inner(custom(positive)))]
+    #[garde(length(min = 1, max = 32), inner(custom(within(1e-9, 1e6))))]
     #[serde(alias = "efforts")]
     pub control_weights: Vec<f64>,
     /// Weights on the velocity error tried, s².
-    #[garde(length(min = 1), inner(custom(not_negative)))]
+    #[garde(length(min = 1, max = 32), inner(custom(within(0.0, 1e6))))]
     pub velocity_weights: Vec<f64>,
     /// Noise inflations tried.
-    #[garde(length(min = 1), inner(custom(positive)))]
+    #[garde(length(min = 1, max = 32), inner(custom(within(1e-6, 1e6))))]
     pub noise_factors: Vec<f64>,
     /// Clamps of the fast part tried, m.
-    #[garde(length(min = 1), inner(custom(positive)))]
+    #[garde(length(min = 1, max = 32), inner(custom(within(1e-6, 100.0))))]
     pub fast_limits: Vec<f64>,
     /// Desired accelerations at which half of the fast clamp is left, tried, m/s².
-    #[garde(length(min = 1), inner(custom(positive)))]
+    #[garde(length(min = 1, max = 32), inner(custom(within(1e-6, 1e6))))]
     pub authority_scales: Vec<f64>,
     /// Error of the position at which half of the fast clamp is left, m.
-    #[garde(custom(positive))]
+    #[garde(custom(within(1e-6, 1e3)))]
     pub error_scale: f64,
     /// Decay of the recent peak of desired acceleration and error in a reference tick.
-    #[garde(custom(share))]
+    #[garde(custom(within(0.0, 1.0 - f64::EPSILON)))]
     pub authority_decay: f64,
     /// Clamp of the integral part, m.
-    #[garde(custom(not_negative))]
+    #[garde(custom(within(0.0, 100.0)))]
     pub integral_limit: f64,
     /// Everything else of the design.
-    #[garde(skip)]
+    #[garde(custom(designable))]
     pub design: DesignSettings,
 }
 
@@ -163,50 +163,50 @@ pub struct Recipe {
     #[garde(custom(fits_preview(self.divisor)))]
     pub window: [i16; 2],
     /// Distance between the offsets of the window, in sub-rate ticks.
-    #[garde(range(min = 1))]
+    #[garde(custom(within(1.0, 1000.0)))]
     pub window_step: i16,
     /// Reference ticks in a sub-rate tick.
-    #[garde(range(min = 1))]
+    #[garde(custom(within(1.0, 1000.0)))]
     pub divisor: u16,
     /// Held or ramped between sub-rate ticks.
     #[garde(skip)]
     pub interpolation: Interpolation,
     /// Time in which a lane fades in or out, s.
-    #[garde(custom(not_negative))]
+    #[garde(custom(within(0.0, 60.0)))]
     pub fade_s: f64,
     /// Zero-phase smoothing of logs with noise, s.
-    #[garde(custom(not_negative))]
+    #[garde(custom(within(0.0, 2.0)))]
     pub smoothing_s: f64,
     /// Every how many reference ticks a training row is taken.
-    #[garde(range(min = 1))]
+    #[garde(custom(counted(1, 10_000)))]
     pub stride: usize,
     /// Training flights.
-    #[garde(length(min = 1), dive)]
+    #[garde(length(min = 1, max = 64), dive)]
     #[serde(alias = "excitations")]
     pub training_flights: Vec<FlightSet>,
     /// Penalty of the ridge regression.
-    #[garde(custom(not_negative))]
+    #[garde(custom(within(0.0, 1e6)))]
     pub ridge_penalty: f64,
     /// Training of the network on what the ridge regression leaves.
-    #[garde(skip)]
+    #[garde(custom(trainable))]
     pub network: TrainingSettings,
     /// Weight decays tried in its place.
-    #[garde(length(min = 1), inner(custom(not_negative)))]
+    #[garde(length(min = 1, max = 32), inner(custom(within(0.0, 1e3))))]
     pub weight_decays: Vec<f64>,
     /// Factors tried on what the network adds to the ridge regression.
-    #[garde(length(min = 1), inner(custom(not_negative)))]
+    #[garde(length(min = 1, max = 32), inner(custom(within(0.0, 10.0))))]
     pub shares: Vec<f32>,
     /// Fine-tuning with int8 weights imitated.
-    #[garde(skip)]
+    #[garde(custom(trainable))]
     pub fine_tuning: TrainingSettings,
     /// Feedback lane.
     #[garde(dive)]
     pub lane: LaneRecipe,
     /// Strokes of the validation set (a seed of their own, never those of the test).
-    #[garde(range(min = 1))]
+    #[garde(custom(counted(1, 1000)))]
     pub validation_strokes: usize,
     /// Speeds at which they are flown.
-    #[garde(length(min = 1), inner(custom(positive)))]
+    #[garde(length(min = 1, max = 32), inner(custom(within(0.05, 20.0))))]
     pub validation_speeds: Vec<f64>,
 }
 
@@ -274,24 +274,102 @@ fn fits_preview(divisor: u16) -> impl FnOnce(&[i16; 2], &()) -> garde::Result {
     }
 }
 
-/// `Ok` where `holds`. Written so that what is not a number is refused as well, which a range of garde lets pass.
-fn rule(holds: bool, text: &str) -> garde::Result {
-    if holds { Ok(()) } else { Err(garde::Error::new(text)) }
+/// From `low` to `high`. Written so that what is not a number is refused as well, which a range of garde lets pass.
+pub fn within<T: Copy + Into<f64> + std::fmt::Display>(low: f64, high: f64) -> impl FnOnce(&T, &()) -> garde::Result {
+    move |value, _| {
+        if (low..=high).contains(&(*value).into()) {
+            Ok(())
+        } else {
+            Err(garde::Error::new(format!("{value} is not from {low} to {high}")))
+        }
+    }
 }
 
-/// A finite number above 0.
-pub fn positive<T: Copy + Into<f64>>(value: &T, _: &()) -> garde::Result {
-    let value = (*value).into();
-    rule(value.is_finite() && value > 0.0, "must be a number above 0")
+/// [`within`] for a count.
+pub fn counted(low: usize, high: usize) -> impl FnOnce(&usize, &()) -> garde::Result {
+    move |value, _| {
+        if (low..=high).contains(value) { Ok(()) } else { Err(garde::Error::new(format!("{value} is not from {low} to {high}"))) }
+    }
 }
 
-/// A finite number, 0 or more.
-pub fn not_negative<T: Copy + Into<f64>>(value: &T, _: &()) -> garde::Result {
-    let value = (*value).into();
-    rule(value.is_finite() && value >= 0.0, "must be a number, 0 or more")
+/// Longest flight of a set, s, and all of its flights together: what a gigabyte of logs holds.
+const SECONDS: [f64; 2] = [3590.0, 36_000.0];
+
+/// Strokes are as long as they are; other flights last as long as their signal needs to rise and fall.
+fn length_of(signal: Signal, flights: u32) -> impl FnOnce(&f64, &()) -> garde::Result {
+    move |seconds, context| {
+        let shortest = if signal == Signal::Strokes { 0.0 } else { 6.0 };
+        within(shortest, SECONDS[0])(seconds, context)?;
+        let all = seconds * f64::from(flights);
+        if all <= SECONDS[1] {
+            Ok(())
+        } else {
+            Err(garde::Error::new(format!("{flights} flights of {seconds} s are {all} s, more than {} s", SECONDS[1])))
+        }
+    }
 }
 
-/// From 0 to below 1.
-fn share(value: &f64, _: &()) -> garde::Result {
-    rule((0.0..1.0).contains(value), "must be from 0 to below 1")
+/// The shortest period is that of a tone or a piece of spline: strokes have none.
+fn shortest_of(signal: Signal) -> impl FnOnce(&f64, &()) -> garde::Result {
+    move |seconds, context| match signal {
+        Signal::Strokes => within(0.0, 60.0)(seconds, context),
+        Signal::Multisine => within(0.05, 10.0)(seconds, context),
+        Signal::Spline => within(0.05, 60.0)(seconds, context),
+    }
+}
+
+/// What the training and the firmware can use.
+fn trainable(settings: &TrainingSettings, _: &()) -> garde::Result {
+    settings.check(REFERENCE).map_err(|error| garde::Error::new(error.to_string()))
+}
+
+fn designable(settings: &DesignSettings, _: &()) -> garde::Result {
+    settings.check().map_err(|error| garde::Error::new(error.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_training_can_use_is_refused_with_value_and_range() {
+        Recipe::default().validate().unwrap();
+        for (text, refusal) in [
+            ("window_step = 0", "window_step: 0 is not from 1 to 1000"),
+            ("fade_s = 1e12", "fade_s: 1000000000000 is not from 0 to 60"),
+            ("smoothing_s = nan", "smoothing_s: NaN is not from 0 to 2"),
+            ("validation_speeds = [0.0]", "validation_speeds[0]: 0 is not from 0.05 to 20"),
+            ("[network]\nhidden = [1000000]", "network: training setting `hidden` is [1000000]"),
+            ("[network]\nepochs = 1000000000000", "network: training setting `epochs` is 1000000000000"),
+            ("[lane.design]\nlags = 1000000", "lane.design: `lags` is 1000000"),
+            ("[lane]\ndither = 1e308", "lane.dither: "),
+        ] {
+            let recipe: Recipe = toml::from_str(text).unwrap();
+            let message = recipe.validate().expect_err(text).to_string();
+            assert!(message.contains(refusal), "{text}: {message}");
+        }
+        for (change, refusal) in [
+            ("shortest_s = 0.0", "shortest_s: 0 is not from 0.05 to 10"),
+            ("seconds = 0.0", "seconds: 0 is not from 6 to 3590"),
+            ("seconds = 1e12", "seconds: 1000000000000 is not from 6 to 3590"),
+            ("flights = 4000000000", "flights: 4000000000 is not from 1 to 3000"),
+            ("flights = 3000", "seconds: 3000 flights of 90 s are 270000 s"),
+            ("max_speed = 0.0", "max_speed: 0 is not from 0.01 to 50"),
+        ] {
+            let usual = [
+                "signal = \"multisine\"",
+                "flights = 2",
+                "seconds = 90.0",
+                "max_speed = 1.5",
+                "max_acceleration = 5.0",
+                "shortest_s = 0.5",
+            ];
+            let key = change.split(' ').next().unwrap();
+            let lines: Vec<&str> =
+                usual.iter().map(|line| if line.starts_with(&format!("{key} ")) { change } else { line }).collect();
+            let recipe: Recipe = toml::from_str(&format!("[[training_flights]]\n{}", lines.join("\n"))).unwrap();
+            let message = recipe.validate().expect_err(change).to_string();
+            assert!(message.contains(&format!("training_flights[0].{refusal}")), "{change}: {message}");
+        }
+    }
 }

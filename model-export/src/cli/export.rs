@@ -7,14 +7,17 @@ use std::{
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use impromptu_firmware::model::{Model, file};
+use impromptu_files::{place, replacement::replace, text::line};
+use impromptu_firmware::model::Model;
 use serde::Serialize;
 
-use super::{files::beside, format::Format};
+use super::{
+    ambiguous::Ambiguous,
+    files::{beside, read, refuse_foreign},
+    format::Format,
+};
 use crate::{
-    Description, FloatNetwork, Precision, encode,
-    replacement::replace,
-    rows,
+    Description, FloatNetwork, Precision, encode, rows,
     verify::{Comparison, compare},
 };
 
@@ -40,6 +43,9 @@ pub(super) struct Export {
     /// Replace FILE even if it is not a model file.
     #[arg(long)]
     force: bool,
+    /// Take a description that belongs to another network or does not say to which: shapes alone are checked.
+    #[arg(long)]
+    untied: bool,
     /// How to print what was written.
     #[arg(long, value_enum, default_value_t)]
     format: Format,
@@ -67,13 +73,13 @@ struct Written {
 }
 
 impl Export {
-    pub(super) fn run(self, out: &mut dyn Write) -> Result<()> {
+    pub(super) fn run(self, out: &mut dyn Write, messages: &mut dyn Write) -> Result<()> {
         let description_path = match (&self.description, &self.network) {
             (Some(path), _) => path.clone(),
             (None, Some(network)) => beside(network, "json"),
             (None, None) => bail!("give --network or --description"),
         };
-        let text = std::fs::read_to_string(&description_path).with_context(|| description_path.display().to_string())?;
+        let text = String::from_utf8(read(&description_path)?).with_context(|| description_path.display().to_string())?;
         let description = Description::from_json(&text).with_context(|| description_path.display().to_string())?;
         if self.network.is_none() && !description.features.is_empty() {
             bail!("{}: lists `features`, so give the --network that reads them", description_path.display());
@@ -87,12 +93,14 @@ impl Export {
             Some(path) => rows::read(path, description.features.len())?,
             None => Vec::new(),
         };
-        for input in [Some(&description_path), self.network.as_ref(), calibration_path.as_ref()].into_iter().flatten() {
-            if same_file(input, &self.output) {
-                bail!("{}: is an input, give another --output", self.output.display());
-            }
+        let inputs = [Some(&description_path), self.network.as_ref(), calibration_path.as_ref()];
+        place::check(&self.output)
+            .and_then(|()| place::apart(&self.output, inputs.into_iter().flatten()))
+            .with_context(|| format!("--output {}", self.output.display()))?;
+        if let Some(network) = &network {
+            self.check_tie(&description, &description_path, network, &calibration, messages)?;
         }
-        self.refuse_foreign()?;
+        refuse_foreign(&self.output, self.force)?;
         let precision = match self.precision {
             PrecisionName::Float => Precision::Float,
             PrecisionName::Int8 => Precision::Int8,
@@ -115,31 +123,50 @@ impl Export {
         self.format.print(out, &written, || written.text())
     }
 
-    /// A slip such as `--output notes.txt` must not cost the notes.
-    fn refuse_foreign(&self) -> Result<()> {
-        let is_model = |path: &Path| -> std::io::Result<bool> {
-            let mut magic = Vec::new();
-            std::io::Read::read_to_end(&mut std::io::Read::take(std::fs::File::open(path)?, 8), &mut magic)?;
-            Ok(magic == file::MAGIC)
-        };
-        let path = &self.output;
-        if path.is_dir() {
-            bail!("{}: is a folder, give a file", path.display());
+    /// Network, description and rows must be of one training: another one's limits, features and scales would fly with them.
+    fn check_tie(
+        &self,
+        description: &Description,
+        path: &Path,
+        network: &FloatNetwork,
+        rows: &[Vec<f32>],
+        messages: &mut dyn Write,
+    ) -> Result<()> {
+        let name = self.network.as_deref().unwrap_or(path).display();
+        let path = path.display();
+        match description.tie.map(|tie| tie.differs(network, rows)) {
+            Some(None) => Ok(()),
+            _ if self.untied => {
+                let remark =
+                    format!("model-export: {path}: not known to belong to {name}, taken with --untied; shapes are checked");
+                Ok(writeln!(messages, "{}", line(&remark))?)
+            }
+            Some(Some(what)) => bail!(
+                "{path}: belongs to another training than {name} (the {what} differ): give the files of one training; \
+                 `host-sim train` with the same logs, --name and --out writes all of them anew; \
+                 --untied if they were changed by hand"
+            ),
+            None if self.is_beside() => Ok(()),
+            None => Err(Ambiguous(format!(
+                "{path}: does not say which network it belongs to, and is not the .json beside {name}: give --untied if it \
+                 belongs to it, or the description of that network"
+            ))
+            .into()),
         }
-        if !self.force && path.exists() && !is_model(path).with_context(|| path.display().to_string())? {
-            bail!("{}: exists and is not a model file; give another --output, or --force to replace it", path.display());
-        }
-        Ok(())
     }
-}
 
-fn same_file(one: &Path, other: &Path) -> bool {
-    one == other || matches!((one.canonicalize(), other.canonicalize()), (Ok(one), Ok(other)) if one == other)
+    /// Files of other tools, and older ones, have no tie: the description beside the network, under its name, is its own.
+    fn is_beside(&self) -> bool {
+        match (&self.description, &self.network) {
+            (Some(description), Some(network)) => place::same(description, &beside(network, "json")),
+            _ => true,
+        }
+    }
 }
 
 impl Written {
     fn text(&self) -> String {
-        let mut text = format!("{}: {} bytes, CRC {}\n", self.file.display(), self.bytes, self.crc);
+        let mut text = format!("{}: {} bytes, CRC {}\n", line(&self.file.display().to_string()), self.bytes, self.crc);
         if let Some(comparison) = &self.comparison {
             text += &format!("against the float network over {} calibration rows:\n{comparison}\n", self.calibration_rows);
         }

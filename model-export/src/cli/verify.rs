@@ -4,15 +4,17 @@ use std::{io::Write, path::PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Args;
+use impromptu_files::text::line;
 use impromptu_firmware::model::Model;
 use serde::Serialize;
 
 use super::{
-    files::{beside, read},
+    files::{beside, read, unsigned},
     format::Format,
 };
 use crate::{
     FloatNetwork, rows,
+    signing::{read_public, verify},
     verify::{Comparison, compare},
 };
 
@@ -33,6 +35,9 @@ pub(super) struct Verify {
     /// Fail if the RMS difference of any output is larger, in percent of the RMS of its correction.
     #[arg(long, value_name = "PERCENT", requires = "network", value_parser = limit)]
     max_rms_percent: Option<f64>,
+    /// Fail if the owner of this public key has not signed the model.
+    #[arg(long, value_name = "NAME.pub")]
+    key: Option<PathBuf>,
     /// How to print the result.
     #[arg(long, value_enum, default_value_t)]
     format: Format,
@@ -47,6 +52,8 @@ fn limit(text: &str) -> Result<f64, String> {
 struct Verified {
     file: PathBuf,
     crc: String,
+    /// Version that the owner of the key has signed; none without a key.
+    signed_version: Option<u32>,
     /// Probes of the network lane that gave their bits.
     network_probes: u8,
     /// Axes of the feedback lane whose probe gave its bits.
@@ -60,7 +67,14 @@ impl Verify {
     /// Whether every check passed.
     pub(super) fn run(self, out: &mut dyn Write, messages: &mut dyn Write) -> Result<bool> {
         let bytes = read(&self.file)?;
-        let model = Model::from_bytes(&bytes).with_context(|| self.file.display().to_string())?;
+        let signed_version = match &self.key {
+            Some(path) => {
+                let key = read_public(path)?;
+                Some(verify(&bytes, &key).with_context(|| self.file.display().to_string())?.version)
+            }
+            None => None,
+        };
+        let model = Model::from_bytes(unsigned(&bytes)).with_context(|| self.file.display().to_string())?;
         let comparison = match &self.network {
             Some(path) => {
                 let network = FloatNetwork::read(path)?;
@@ -73,6 +87,7 @@ impl Verify {
         let failures = comparison.as_ref().map_or_else(Vec::new, |comparison| self.failures(comparison));
         let verified = Verified {
             crc: format!("{:08x}", model.checksum()),
+            signed_version,
             network_probes: if model.network().is_some() { model.card().probes.count } else { 0 },
             feedback_lane_probes: model.feedback().map_or(0, |lane| lane.axes().len()),
             comparison,
@@ -80,7 +95,7 @@ impl Verify {
             file: self.file,
         };
         for failure in &verified.failures {
-            writeln!(messages, "model-export: {failure}")?;
+            writeln!(messages, "model-export: {}", line(failure))?;
         }
         self.format.print(out, &verified, || verified.text())?;
         Ok(verified.failures.is_empty())
@@ -104,7 +119,10 @@ impl Verify {
 
 impl Verified {
     fn text(&self) -> String {
-        let mut text = format!("{}: loads, CRC {}\n", self.file.display(), self.crc);
+        let mut text = format!("{}: loads, CRC {}\n", line(&self.file.display().to_string()), self.crc);
+        if let Some(version) = self.signed_version {
+            text += &format!("signed by this key as version {version}\n");
+        }
         text += &format!(
             "same bits on this machine: {} network probes, {} feedback lane axes\n",
             self.network_probes, self.feedback_lane_probes

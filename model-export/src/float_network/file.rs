@@ -17,9 +17,9 @@ use super::{
     Activation, DenseLayer, FloatNetwork, FloatNetworkError,
     names::{is_reserved, layer_bias_name, layer_weight_name},
 };
+use impromptu_files::{reading, replacement::replace};
 use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// The metadata entry `format`: what tells such a file from any other safetensors file.
@@ -168,22 +168,13 @@ impl FloatNetwork {
         let content = |source| FloatNetworkFileError::Content { path: path.to_owned(), source: Box::new(source) };
         let bytes = self.to_bytes().map_err(content)?;
         let io_error = |source| FloatNetworkFileError::Io { path: path.to_owned(), source };
-        let mut temporary_name = path.as_os_str().to_owned();
-        temporary_name.push(format!(".{}.part", std::process::id()));
-        let temporary = PathBuf::from(temporary_name);
-        let written = std::fs::File::create(&temporary)
-            .and_then(|mut file| file.write_all(&bytes).and_then(|()| file.sync_all()))
-            .and_then(|()| std::fs::rename(&temporary, path));
-        if written.is_err() {
-            // Best effort: the error that matters is the first one.
-            let _ = std::fs::remove_file(&temporary);
-        }
-        written.map_err(io_error)
+        replace(path, &bytes).map_err(io_error)
     }
 
     /// Reads a file that [`FloatNetwork::write`] or another tool wrote.
     pub fn read(path: &Path) -> Result<Self, FloatNetworkFileError> {
-        let bytes = std::fs::read(path).map_err(|source| FloatNetworkFileError::Io { path: path.to_owned(), source })?;
+        let bytes = reading::read(path, reading::DOCUMENT)
+            .map_err(|source| FloatNetworkFileError::Io { path: path.to_owned(), source })?;
         Self::from_bytes(&bytes)
             .map_err(|source| FloatNetworkFileError::Content { path: path.to_owned(), source: Box::new(source) })
     }

@@ -10,7 +10,7 @@ use impromptu_firmware::{
 use impromptu_model_export::{Description, Precision, encode, float_network::Activation};
 use proptest::prelude::*;
 
-use crate::fixture::{Numbers, constant_model, description, lane, network, rows, table};
+use crate::fixture::{CAPS, Numbers, constant_model, description, lane, network, rows, table};
 
 const RULES: [EndRule; 2] = [EndRule::Hold, EndRule::Zero];
 const CAPACITY: usize = 128;
@@ -28,7 +28,7 @@ fn fly(
     lanes: impl Fn(i32) -> Lanes,
 ) -> Vec<([f32; 2], [f32; 2], [f32; 2])> {
     let model = Model::from_bytes(bytes).unwrap();
-    let mut adapter: Adapter<'_, 2, 2, 2> = Adapter::new(&model, &table(description), 100.0, CAPACITY).unwrap();
+    let mut adapter: Adapter<'_, 2, 2, 2> = Adapter::new(&model, &table(description), 100.0, &CAPS, CAPACITY).unwrap();
     let mut preview = Preview::<2, CAPACITY>::new(RULES, -AHEAD);
     (-AHEAD..AHEAD).for_each(|tick| preview.push(desired(tick)));
     (0..ticks)
@@ -229,7 +229,7 @@ fn applications_that_do_not_fit_are_refused() {
     let bytes = constant_model(description.clone(), [0.0; 2]);
     let model = Model::from_bytes(&bytes).unwrap();
     let refusal = |description: &Description, rate, capacity| {
-        Adapter::<2, 2, 2>::new(&model, &table(description), rate, capacity).map(|_| ()).unwrap_err()
+        Adapter::<2, 2, 2>::new(&model, &table(description), rate, &CAPS, capacity).map(|_| ()).unwrap_err()
     };
     let changed = |change: &dyn Fn(&mut Description)| {
         let mut other = description.clone();
@@ -242,12 +242,12 @@ fn applications_that_do_not_fit_are_refused() {
     assert_eq!(changed(&|d| d.signals.desired[1].end = EndRule::Hold), Refusal::Signal { signal: "desired", channel: 1 });
     assert_eq!(changed(&|d| d.signals.desired.truncate(1)), Refusal::Signal { signal: "desired", channel: 1 });
     // The arrays may be longer than the signals, as the C face's are, but not shorter.
-    assert!(Adapter::<2, 3, 2>::new(&model, &table(&description), 100.0, CAPACITY).is_ok());
-    let missing = Adapter::<2, 1, 2>::new(&model, &table(&description), 100.0, CAPACITY).map(|_| ()).unwrap_err();
+    assert!(Adapter::<2, 3, 2>::new(&model, &table(&description), 100.0, &CAPS, CAPACITY).is_ok());
+    let missing = Adapter::<2, 1, 2>::new(&model, &table(&description), 100.0, &CAPS, CAPACITY).map(|_| ()).unwrap_err();
     assert_eq!(missing, Refusal::Signal { signal: "measured", channel: 1 });
     assert_eq!(refusal(&description, 50.0, CAPACITY), Refusal::Rate { model: 100.0, application: 50.0 });
     assert!(matches!(refusal(&description, f32::NAN, CAPACITY), Refusal::Rate { .. }));
     // 3 ticks of the past (the measurement's age between two of them), now, and one offset plus the ramp's period.
     assert_eq!(refusal(&description, 100.0, 23), Refusal::Preview { needed: 24, available: 23 });
-    assert!(Adapter::<2, 2, 2>::new(&model, &table(&description), 100.0, 24).is_ok());
+    assert!(Adapter::<2, 2, 2>::new(&model, &table(&description), 100.0, &CAPS, 24).is_ok());
 }

@@ -3,7 +3,7 @@
 
 use impromptu_firmware::{
     adapter::{Adapter, Lanes},
-    add_on::{AddOn, NotFinite, Report},
+    add_on::{AddOn, PushError, Report},
     model::{Channels, Interpolation, Model, Refusal},
     network::Scratch,
     preview::{EndRule, Preview},
@@ -12,17 +12,17 @@ use proptest::prelude::*;
 
 use crate::{
     adapter::violent,
-    fixture::{Numbers, constant_model, description, table},
+    fixture::{CAPS, Numbers, constant_model, description, table},
 };
 
 const CAPACITY: usize = 128;
 const AHEAD: i32 = 60;
 type Cart<'m> = AddOn<'m, 2, 2, 2, CAPACITY>;
 
-/// The report of an add-on that has done nothing.
-fn nothing(next_tick: i32) -> Report {
+/// The report of an add-on that has done nothing but so many ticks.
+fn nothing(next_tick: i32, ticks: i32) -> Report {
     let mut report = Report::default();
-    report.next_tick = next_tick;
+    (report.next_tick, report.reach) = (next_tick, if ticks > 0 { next_tick - ticks } else { 0 });
     report
 }
 
@@ -43,13 +43,13 @@ proptest! {
         let model = Model::from_bytes(&bytes).unwrap();
         let table = table(&description);
         let (mut adapter, mut preview) = (
-            Adapter::<2, 2, 2>::new(&model, &table, 100.0, CAPACITY).unwrap(),
+            Adapter::<2, 2, 2>::new(&model, &table, 100.0, &CAPS, CAPACITY).unwrap(),
             Preview::<2, CAPACITY>::new([EndRule::Hold, EndRule::Zero], first),
         );
-        let (mut whole, mut split) = (Cart::new(&model, &table, 100.0).unwrap(), Cart::empty());
+        let (mut whole, mut split) = (Cart::new(&model, &table, 100.0, &CAPS).unwrap(), Cart::empty());
         split.bypass(&table).unwrap();
         split.push([9.0, 9.0]).unwrap();
-        split.load(&model, &table, 100.0).unwrap();
+        split.load(&model, &table, 100.0, &CAPS).unwrap();
         // A ramped correction needs the inference until the next tick, a held one at once.
         let deferred = linear && deferred;
         if deferred {
@@ -97,7 +97,7 @@ fn without_a_model_the_reference_is_the_desired_one() {
     assert_eq!(bits(add_on.step(0, &[f32::NAN, 1.0], &mut Scratch::new())), bits([1.5, -0.0]));
     // The end rules are those of the table: the position holds, the velocity vanishes.
     assert_eq!(add_on.step(1, &[0.0; 2], &mut Scratch::new()), [1.5, 0.0]);
-    assert!(add_on.guard().is_none() && add_on.report() == nothing(1));
+    assert!(add_on.guard().is_none() && add_on.report() == nothing(1, 2));
     // A table in another order is followed by its names.
     let swapped = [table.reference[1], table.reference[0]];
     let signals = Channels { reference: &swapped, ..Channels::from(&table) };
@@ -124,13 +124,13 @@ fn a_refused_model_and_a_refused_sample_change_nothing() {
     let model = Model::from_bytes(&bytes).unwrap();
     let table = table(&description);
     let signals = Channels::from(&table);
-    let mut add_on = Cart::new(&model, signals, 100.0).unwrap();
+    let mut add_on = Cart::new(&model, signals, 100.0, &CAPS).unwrap();
     add_on.switch(Lanes::BOTH);
     add_on.push([1.0, 2.0]).unwrap();
-    assert_eq!(add_on.load(&model, signals, 50.0), Err(Refusal::Rate { model: 100.0, application: 50.0 }));
-    assert_eq!(Cart::check(&model, signals, 50.0), Err(Refusal::Rate { model: 100.0, application: 50.0 }));
-    assert_eq!(add_on.push([1.0, f32::NAN]), Err(NotFinite { channel: 1 }));
-    assert_eq!(add_on.push([f32::INFINITY, f32::NAN]), Err(NotFinite { channel: 0 }));
+    assert_eq!(add_on.load(&model, signals, 50.0, &CAPS), Err(Refusal::Rate { model: 100.0, application: 50.0 }));
+    assert_eq!(Cart::check(&model, signals, 50.0, &CAPS), Err(Refusal::Rate { model: 100.0, application: 50.0 }));
+    assert_eq!(add_on.push([1.0, f32::NAN]), Err(PushError::NotFinite { channel: 1 }));
+    assert_eq!(add_on.push([f32::INFINITY, f32::NAN]), Err(PushError::NotFinite { channel: 0 }));
     assert_eq!((add_on.next_tick(), add_on.desired(0)), (1, [1.0, 2.0]));
     assert_eq!(add_on.step(0, &[0.0; 2], &mut Scratch::new()), [1.1, 2.5]);
 }
@@ -141,7 +141,7 @@ fn clearing_keeps_the_fade_a_reset_the_wanted_lanes_and_a_restart_neither() {
     description.timing.fade_s = 0.04;
     let bytes = constant_model(description.clone(), [0.25, 0.5]);
     let model = Model::from_bytes(&bytes).unwrap();
-    let mut add_on = Cart::new(&model, &table(&description), 100.0).unwrap();
+    let mut add_on = Cart::new(&model, &table(&description), 100.0, &CAPS).unwrap();
     add_on.switch(Lanes { network: true, feedback: false });
     let weight = |add_on: &mut Cart<'_>, tick| {
         add_on.push([0.0; 2]).unwrap();
@@ -154,5 +154,5 @@ fn clearing_keeps_the_fade_a_reset_the_wanted_lanes_and_a_restart_neither() {
     add_on.reset(0);
     assert_eq!((weight(&mut add_on, 0), add_on.report().next_tick), (0.25, 1));
     add_on.restart(-5);
-    assert_eq!((weight(&mut add_on, -5), add_on.report()), (0.0, nothing(-4)));
+    assert_eq!((weight(&mut add_on, -5), add_on.report()), (0.0, nothing(-4, 0)));
 }

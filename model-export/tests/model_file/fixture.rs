@@ -1,6 +1,7 @@
 //! Small models and what is needed to spoil them.
 
 use impromptu_firmware::{
+    caps::{Cap, Caps},
     features::{Feature, Relative, Source},
     model::{Card, Channel, Interpolation, Margins, Output, SignalTable, file},
     preview::EndRule,
@@ -63,6 +64,7 @@ pub(crate) fn description(window: usize) -> Description {
         envelope: vec![(-3.0, 3.0); window],
         feedback_lane: None,
         monitor: None,
+        tie: None,
     }
 }
 
@@ -158,6 +160,9 @@ pub(crate) fn constant_model(mut description: Description, correction: [f32; 2])
 }
 
 /// The signal table of an application that fits.
+/// No bound of the application's: what the tests are about is the model's own.
+pub(crate) const CAPS: Caps<'_> = Caps { channels: &[Cap { limit: 1e9, rate: 1e12 }; 2], sums: &[] };
+
 pub(crate) fn table(description: &Description) -> SignalTable<'_> {
     fn borrowed<const N: usize>(channels: &[ChannelDescription]) -> heapless::Vec<Channel<'_>, N> {
         channels.iter().map(|c| Channel { name: &c.name, unit: &c.unit, frame: &c.frame, end: c.end }).collect()

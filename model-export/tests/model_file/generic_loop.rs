@@ -1,7 +1,7 @@
 //! The add-on knows no quadrotor: the first system of Zhou 2017 (equation 9), flown with the exact inverse as a linear map.
 
 use impromptu_firmware::{
-    AddOn,
+    AddOn, Caps,
     adapter::Lanes,
     features::{Feature, Relative, Source},
     model::{Interpolation, Model, Output},
@@ -14,7 +14,7 @@ use impromptu_model_export::{
     encode,
 };
 
-use crate::fixture::table;
+use crate::fixture::{CAPS, table};
 
 /// One output, two measured states, one reference; nothing has a unit.
 fn description() -> Description {
@@ -45,6 +45,7 @@ fn description() -> Description {
         envelope: vec![(-10.0, 10.0); 3],
         feedback_lane: None,
         monitor: None,
+        tie: None,
     }
 }
 
@@ -66,7 +67,8 @@ fn tracking_error(lanes: Lanes) -> f64 {
     let description = description();
     let bytes = encode(&description, Some(&exact_law()), Precision::Float, &[]).unwrap();
     let model = Model::from_bytes(&bytes).unwrap();
-    let mut add_on = AddOn::<1, 2, 1, 8>::new(&model, &table(&description), 100.0).unwrap();
+    let mut add_on =
+        AddOn::<1, 2, 1, 8>::new(&model, &table(&description), 100.0, &Caps { channels: &[CAPS.channels[0]], ..CAPS }).unwrap();
     add_on.switch(lanes);
     let desired = |tick: i32| {
         let t = 0.01 * f64::from(tick);

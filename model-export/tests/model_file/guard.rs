@@ -13,7 +13,7 @@ use impromptu_model_export::{
 };
 use proptest::prelude::*;
 
-use crate::fixture::{constant_model, description, lane, table};
+use crate::fixture::{CAPS, constant_model, description, lane, table};
 
 const CAPACITY: usize = 64;
 
@@ -54,7 +54,7 @@ fn fly(
 ) -> Vec<Tick> {
     let bytes = constant_model(description.clone(), correction);
     let model = Model::from_bytes(&bytes).unwrap();
-    let mut adapter: Adapter<'_, 2, 2, 2> = Adapter::new(&model, &table(&description), 100.0, CAPACITY).unwrap();
+    let mut adapter: Adapter<'_, 2, 2, 2> = Adapter::new(&model, &table(&description), 100.0, &CAPS, CAPACITY).unwrap();
     adapter.set_guard(settings);
     let mut preview = Preview::<2, CAPACITY>::new([EndRule::Hold, EndRule::Zero], 0);
     (0..20).for_each(|tick| preview.push(doing(tick).desired));
@@ -93,17 +93,29 @@ fn a_good_flight_trips_nothing() {
     assert_eq!(flight[599].correction[0], 0.1);
 }
 
+/// One bad sample is one missed sample.
 #[test]
-fn a_measurement_that_is_no_number_takes_both_lanes_off_once_and_back_after_the_hold_time() {
-    let doing = |tick: i32| Doing {
-        measured: if (100..110).contains(&tick) { [f32::NAN, 0.0] } else { [1.0, 0.0] },
-        ..calm(Lanes::BOTH)
-    };
+fn a_measurement_that_is_no_number_costs_nothing_for_as_long_as_a_missing_one() {
+    let good = |_: i32| Doing { measured: [1.0, 0.0], ..calm(Lanes::BOTH) };
+    let bad = |tick: i32| Doing { measured: if (100..110).contains(&tick) { [f32::NAN, 0.0] } else { [1.0, 0.0] }, ..good(tick) };
+    let description = Description { monitor: None, ..guarded() };
+    let without = fly(description.clone(), [0.1, 0.0], GuardSettings::default(), 200, good);
+    let with = fly(description, [0.1, 0.0], GuardSettings::default(), 200, bad);
+    for (with, without) in with.iter().zip(&without) {
+        assert_eq!((bits(with.reference), with.trips), (bits(without.reference), Trips::default()));
+    }
+}
+
+#[test]
+fn measurements_that_are_no_numbers_for_long_take_both_lanes_off_once_and_back_after_the_hold_time() {
+    let doing =
+        |tick: i32| Doing { measured: if (90..110).contains(&tick) { [f32::NAN, 0.0] } else { [1.0, 0.0] }, ..calm(Lanes::BOTH) };
     // What the network would do meanwhile is no evidence here.
     let description = Description { monitor: None, ..guarded() };
     let flight = fly(description, [0.1, 0.0], GuardSettings::default(), 500, doing);
+    // Older than 0.1 s.
     assert_eq!(flight[99].trips, Trips::default());
-    assert_eq!(flight[100].acting, Lanes::NONE, "at once");
+    assert_eq!(flight[100].acting, Lanes::NONE);
     for tick in &flight[140..300] {
         assert_eq!(bits(tick.reference), bits(tick.desired));
     }
@@ -210,7 +222,7 @@ fn inferences_that_come_too_late_trip_the_network_alone_until_they_are_in_time()
     let description = Description { monitor: None, ..guarded() };
     let bytes = constant_model(description.clone(), [0.1, 0.0]);
     let model = Model::from_bytes(&bytes).unwrap();
-    let mut adapter: Adapter<'_, 2, 2, 2> = Adapter::new(&model, &table(&description), 100.0, CAPACITY).unwrap();
+    let mut adapter: Adapter<'_, 2, 2, 2> = Adapter::new(&model, &table(&description), 100.0, &CAPS, CAPACITY).unwrap();
     adapter.switch(Lanes::BOTH);
     adapter.defer();
     let mut preview = Preview::<2, CAPACITY>::new([EndRule::Hold, EndRule::Zero], 0);

@@ -4,9 +4,11 @@ mod fixture;
 
 mod batch;
 mod bounds;
+mod calls;
 mod command_line;
 mod damage;
 mod description;
+mod edges;
 mod golden;
 mod guard;
 mod precision;

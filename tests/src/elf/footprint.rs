@@ -27,7 +27,9 @@ pub struct Footprint {
 }
 
 fn largest<'p>(pieces: impl Iterator<Item = &'p Piece>) -> Vec<(String, u32)> {
-    let mut pieces: Vec<(String, u32)> = pieces.map(|piece| (piece.name.clone(), size(&piece.addresses))).collect();
+    // The compiler calls a constant without a name `.Lanon.`, a hash that any change of its crate changes, and a number.
+    let name = |piece: &Piece| if piece.name.starts_with(".L") { "(no name)".to_owned() } else { piece.name.clone() };
+    let mut pieces: Vec<(String, u32)> = pieces.map(|piece| (name(piece), size(&piece.addresses))).collect();
     pieces.sort_by(|(name, bytes), (other, others)| others.cmp(bytes).then_with(|| name.cmp(other)));
     pieces
 }

@@ -163,6 +163,7 @@ fn describe(name: &str, features: Vec<Feature>, outputs: usize) -> Description {
         outputs: (0..outputs as u8).map(|channel| Output { channel, limit: 10.0, slew: 1.0 }).collect(),
         feedback_lane: None,
         monitor: None,
+        tie: None,
     }
 }
 

@@ -67,6 +67,7 @@ pub(crate) fn file_at(divisor: u16, shape: &Shape, precision: Precision) -> Vec<
             authority: Default::default(),
             margins: Margins::default(),
         }),
+        tie: None,
         monitor: Some(MonitorDescription {
             divisor: 5,
             validated_rms: 0.01,

@@ -4,23 +4,30 @@ use core::ffi::c_int;
 
 use impromptu_firmware::{
     adapter::Lanes,
+    caps::Caps,
     model::{Channels, Model},
     network::Scratch,
 };
-use impromptu_flight::quadrotor;
+use impromptu_flight::{caps, quadrotor};
 
-use super::{Place, channels, create, input, object, report, signals::table, view};
+use super::{
+    Made, Place, channels, create, input, object, report,
+    signals::{bounds, table},
+    view,
+};
 use crate::{
     adapter::{EMPTY, Stage, counted},
     memory::{AdapterMemory, ModelMemory, Object, ScratchMemory},
     status::Status,
-    values::{Inference, Job, Report, Signals},
+    values::{Cap, Inference, Job, Report, Signals},
 };
 
 /// Creates an adapter in `adapter`, which has `size` bytes, for a loop whose references run at `rate_hz`. Both lanes are off.
 ///
-/// `signals` is compared with the model's table, name by name; NULL takes the model's for the application's. The model must live
-/// as long as the adapter. The first sample pushed will be that of reference tick `first_tick`. Needs up to 4 KB of stack.
+/// `signals` is compared with the model's table, name by name; NULL takes the model's for the application's. `caps` says for each
+/// reference channel, `cap_count` of them in the order of the signals, what its correction may be, whatever the model says: there
+/// is no default. The model must live as long as the adapter. The first sample pushed will be that of reference tick
+/// `first_tick`. Needs up to 4 KB of stack.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_adapter_create(
     adapter: *mut AdapterMemory,
@@ -29,14 +36,18 @@ pub unsafe extern "C" fn impromptu_adapter_create(
     signals: *const Signals,
     rate_hz: f32,
     first_tick: i32,
+    caps: *const Cap,
+    cap_count: usize,
 ) -> Status {
     // SAFETY: the module's rules.
     unsafe {
-        create(adapter, size, |stage| {
+        create(adapter, size, |made| {
             let model = view::<Model<'static>>(model)?;
+            let caps = bounds(caps, cap_count)?;
+            let caps = Caps { channels: &caps, sums: &[] };
             match signals.is_null() {
-                true => fill(stage, model, &(&model.card().signals).into(), rate_hz, first_tick),
-                false => fill(stage, model, &(&table(signals)?).into(), rate_hz, first_tick),
+                true => fill(made, model, &(&model.card().signals).into(), rate_hz, &caps, first_tick),
+                false => fill(made, model, &(&table(signals)?).into(), rate_hz, &caps, first_tick),
             }
         })
     }
@@ -44,7 +55,8 @@ pub unsafe extern "C" fn impromptu_adapter_create(
 
 /// impromptu_adapter_create for the signals of a quadrotor, as the flight stack has them: 10 desired channels (position,
 /// velocity, acceleration, yaw), 13 measured (position, velocity, roll, pitch, yaw, body rates, vertical acceleration without
-/// gravity), 6 references (position, velocity). m, s, rad; world ENU, body FLU, pitch positive nose down.
+/// gravity), 6 references (position, velocity). m, s, rad; world ENU, body FLU, pitch positive nose down. A correction of a
+/// position is at most 1 m and 40 m/s, one of a velocity at most 4 m/s and 160 m/s^2.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_adapter_create_quadrotor(
     adapter: *mut AdapterMemory,
@@ -55,25 +67,27 @@ pub unsafe extern "C" fn impromptu_adapter_create_quadrotor(
 ) -> Status {
     // SAFETY: the module's rules.
     unsafe {
-        create(adapter, size, |stage| fill(stage, view::<Model<'static>>(model)?, &quadrotor::signals(), rate_hz, first_tick))
+        create(adapter, size, |made| {
+            let caps = Caps { channels: &caps::CHANNELS, sums: &[] };
+            fill(made, view::<Model<'static>>(model)?, &quadrotor::signals(), rate_hz, &caps, first_tick)
+        })
     }
 }
 
-/// Makes an adapter where it will live.
+/// Makes an adapter where it will live. Nothing is written before all has been checked.
 #[inline(never)]
 unsafe fn fill(
-    stage: *mut Stage,
+    made: Made<'_, Stage>,
     model: &'static Model<'static>,
     table: &Channels<'_>,
     rate_hz: f32,
+    caps: &Caps<'_>,
     first_tick: i32,
 ) -> Result<(), Status> {
-    // SAFETY: memory for an add-on that nobody else uses; it is written whole before it is referred to.
-    let stage = unsafe {
-        stage.write(EMPTY);
-        &mut *stage
-    };
-    stage.load(model, table, rate_hz)?;
+    Stage::check(model, table, rate_hz, caps)?;
+    // SAFETY: the module's rules.
+    let stage = unsafe { made.write(EMPTY) };
+    stage.load(model, table, rate_hz, caps)?;
     stage.clear(first_tick);
     Ok(())
 }
@@ -90,12 +104,45 @@ pub unsafe extern "C" fn impromptu_adapter_push(adapter: *mut AdapterMemory, des
     })
 }
 
-/// Forgets the trajectory, for another one: the next sample pushed will be that of reference tick `first_tick`.
+/// Forgets the trajectory, for another one: the next sample pushed will be that of reference tick `first_tick`. Until then the
+/// loop holds what was desired last. For another trajectory on the way without a gap: impromptu_adapter_replan.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_adapter_restart(adapter: *mut AdapterMemory, first_tick: i32) -> Status {
     report(|| {
         // SAFETY: the module's rules.
         unsafe { object::<Stage>(adapter)?.clear(first_tick) };
+        Ok(())
+    })
+}
+
+/// Forgets the samples of reference tick `from` and later, in whose place others will be pushed: the next one is that of
+/// impromptu_report.next_tick, which is `from` unless fewer had been pushed. What lies before stays.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_adapter_replan(adapter: *mut AdapterMemory, from: i32) -> Status {
+    report(|| {
+        // SAFETY: the module's rules.
+        unsafe { object::<Stage>(adapter)?.truncate(from) };
+        Ok(())
+    })
+}
+
+/// Lets lanes act again that the guard has handed over for good. What is still wrong hands them over again.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_adapter_rearm(adapter: *mut AdapterMemory) -> Status {
+    report(|| {
+        // SAFETY: the module's rules.
+        unsafe { object::<Stage>(adapter)?.rearm() };
+        Ok(())
+    })
+}
+
+/// Tells how many reference ticks ago the newest measurement arrived, beyond the delay that the model knows; 0 from the start.
+/// Both lanes are handed over while it is older than 0.1 s.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_adapter_set_age(adapter: *mut AdapterMemory, ticks: u32) -> Status {
+    report(|| {
+        // SAFETY: the module's rules.
+        unsafe { object::<Stage>(adapter)?.set_age(u16::try_from(ticks).unwrap_or(u16::MAX)) };
         Ok(())
     })
 }
@@ -123,6 +170,10 @@ pub unsafe extern "C" fn impromptu_adapter_defer(adapter: *mut AdapterMemory) ->
 }
 
 /// A whole reference tick, the network included: takes what is measured and writes the reference that the loop shall track.
+///
+/// It is written, and the tick is done, also after IMPROMPTU_STATUS_BAD_SAMPLE (a measured number is NaN or infinite: it counts
+/// as a missed sample, the last good one stands in) and IMPROMPTU_STATUS_NO_TRAJECTORY (nothing was pushed since creation or
+/// impromptu_adapter_restart: the loop holds what was desired last or, at first, where it is).
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_adapter_step(
     adapter: *mut AdapterMemory,
@@ -143,7 +194,7 @@ pub unsafe extern "C" fn impromptu_adapter_step(
         let values = adapter.step(tick, &measured, scratch);
         // SAFETY: the module's rules.
         unsafe { place.write_first(&values, reference_count) };
-        Ok(())
+        held(adapter, &measured)
     })
 }
 
@@ -176,18 +227,23 @@ pub unsafe extern "C" fn impromptu_adapter_begin(
     })
 }
 
-/// Takes what came of the last job; one that is not awaited any more is dropped.
+/// Takes what came of the last job; one that is not awaited any more is dropped. One with a number that is not finite is refused,
+/// and late.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_adapter_deliver(adapter: *mut AdapterMemory, inference: *const Inference) -> Status {
     report(|| {
         // SAFETY: the module's rules.
         let (adapter, inference) = unsafe { (object::<Stage>(adapter)?, input(inference)?) };
+        if !inference.outputs.iter().all(|output| output.is_finite()) {
+            return Err(Status::NotFinite);
+        }
         adapter.deliver(inference.into());
         Ok(())
     })
 }
 
-/// Second part of a reference tick: writes the reference that the loop shall track.
+/// Second part of a reference tick: writes the reference that the loop shall track. The statuses are those of
+/// impromptu_adapter_step.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_adapter_finish(
     adapter: *mut AdapterMemory,
@@ -205,11 +261,19 @@ pub unsafe extern "C" fn impromptu_adapter_finish(
         let values = adapter.finish(tick, &measured);
         // SAFETY: the module's rules.
         unsafe { place.write_first(&values, reference_count) };
-        Ok(())
+        held(adapter, &measured)
     })
 }
 
-/// Correction, fades, saturations and late inferences.
+/// What was held in this tick, if anything was.
+fn held(adapter: &Stage, measured: &crate::adapter::Channels) -> Result<(), Status> {
+    if !adapter.has_trajectory() {
+        return Err(Status::NoTrajectory);
+    }
+    if measured.iter().all(|number| number.is_finite()) { Ok(()) } else { Err(Status::BadSample) }
+}
+
+/// Correction, fades, saturations, late inferences, trips and how far the trajectory reaches.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_adapter_report(adapter: *mut AdapterMemory, result: *mut Report) -> Status {
     report(|| {

@@ -1,6 +1,6 @@
 //! The flight stack, from C.
 
-use core::{ffi::c_int, ptr};
+use core::ffi::c_int;
 
 use impromptu_firmware::{adapter::Lanes, model::Model, network::Scratch};
 use impromptu_flight::flight::Flight;
@@ -25,11 +25,13 @@ pub unsafe extern "C" fn impromptu_flight_create(
 ) -> Status {
     // SAFETY: the module's rules.
     unsafe {
-        create::<Stack>(flight, size, |stack| {
+        create::<Stack>(flight, size, |made| {
             let settings = input(settings)?.checked().ok_or(Status::Settings)?;
-            let flight = ptr::addr_of_mut!((*stack).flight);
-            flight.write(EMPTY);
-            if (*flight).configure(&settings) { Ok(()) } else { Err(Status::Settings) }
+            if settings.check().is_err() {
+                return Err(Status::Settings);
+            }
+            made.write(Stack { flight: EMPTY }).flight.configure(&settings);
+            Ok(())
         })
     }
 }
@@ -50,7 +52,9 @@ pub unsafe extern "C" fn impromptu_flight_attach(
     })
 }
 
-/// Appends the desired state of the next reference tick, as far ahead as impromptu_description.future says.
+/// Appends the desired state of the next reference tick, as far ahead as impromptu_description.future says. One that is not
+/// finite, or that no vehicle can be asked for, gives IMPROMPTU_STATUS_NOT_FINITE and is not stored: the next one is still that
+/// of the same tick.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_flight_push(flight: *mut FlightMemory, setpoint: *const Setpoint) -> Status {
     report(|| {
@@ -69,8 +73,9 @@ pub unsafe extern "C" fn impromptu_flight_switch(flight: *mut FlightMemory, netw
     })
 }
 
-/// One control tick, the network included. Ticks count from 0. A state that is not finite gives IMPROMPTU_STATUS_NOT_FINITE and
-/// no command: what the motors then do is the caller's decision. Needs up to 4 KB of stack.
+/// One control tick, the network included. Ticks count from 0. A state that is not finite, or that no vehicle can be in, gives
+/// IMPROMPTU_STATUS_NOT_FINITE, no command, and changes nothing: a missed sample. What the motors then do is the caller's
+/// decision. Needs up to 4 KB of stack.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_flight_step(
     flight: *mut FlightMemory,

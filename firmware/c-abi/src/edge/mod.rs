@@ -51,22 +51,53 @@ fn checked<T>(pointer: *const T) -> Result<*const T, Status> {
     }
 }
 
-/// Creates an object in memory of `size` bytes, in place: it may be larger than a task's stack. If it cannot be made the memory
-/// holds none.
-unsafe fn create<T: Stored>(memory: *mut T::Memory, size: usize, make: impl FnOnce(*mut T) -> Result<(), Status>) -> Status {
+/// Memory in which an object is to be made: whole, and not before everything that may refuse it has been checked.
+struct Made<'p, T>(*mut Object<T>, core::marker::PhantomData<&'p mut T>);
+
+impl<'p, T: Stored> Made<'p, T> {
+    /// Writes the object, in place of what was there.
+    unsafe fn write(self, value: T) -> &'p mut T {
+        // SAFETY: the module's rules.
+        unsafe { self.begin(value).finish() }
+    }
+
+    /// Writes an object that is none before it is [finished](Begun::finish).
+    unsafe fn begin(self, value: T) -> Begun<'p, T> {
+        // SAFETY: memory for an object that nobody else uses; it is written whole before it is referred to.
+        unsafe {
+            ptr::addr_of_mut!((*self.0).mark).write(0);
+            ptr::addr_of_mut!((*self.0).value).write(value);
+            Begun(&mut *self.0)
+        }
+    }
+}
+
+/// An object that is still to be filled.
+struct Begun<'p, T>(&'p mut Object<T>);
+
+impl<'p, T: Stored> Begun<'p, T> {
+    fn value(&mut self) -> &mut T {
+        &mut self.0.value
+    }
+
+    /// From now on it is one.
+    fn finish(self) -> &'p mut T {
+        self.0.mark = T::MARK;
+        &mut self.0.value
+    }
+}
+
+/// Creates an object in memory of `size` bytes, in place: it may be larger than a task's stack. If it cannot be made, what was
+/// there before lives on.
+unsafe fn create<T: Stored>(memory: *mut T::Memory, size: usize, make: impl FnOnce(Made<'_, T>) -> Result<(), Status>) -> Status {
     let () = T::FITS;
     report(|| {
         let object = checked(memory)?.cast::<Object<T>>().cast_mut();
         if size < size_of::<Object<T>>() {
             return Err(Status::Memory);
         }
-        // SAFETY: the caller's memory is aligned (`FITS`) and large enough for the object, and nobody else uses it.
-        unsafe {
-            ptr::addr_of_mut!((*object).mark).write(0);
-            make(ptr::addr_of_mut!((*object).value))?;
-            ptr::addr_of_mut!((*object).mark).write(T::MARK);
-        }
-        Ok(())
+        // The caller's memory is aligned (`FITS`) and large enough for the object, and nobody else uses it.
+        make(Made(object, core::marker::PhantomData))
     })
 }
 

@@ -2,9 +2,12 @@
 
 use core::ffi::c_char;
 
-use impromptu_firmware::{model::Model, network::Scratch};
+use impromptu_firmware::{
+    model::{Model, Refusal},
+    network::Scratch,
+};
 
-use super::{Place, checked, create, input, object, report, view};
+use super::{Begun, Made, Place, checked, create, input, object, report, view};
 use crate::{
     memory::{ModelMemory, Object, ScratchMemory},
     status::Status,
@@ -18,7 +21,8 @@ pub extern "C" fn impromptu_status_text(status: i32) -> *const c_char {
     known.map_or(c"no status of this library", Status::text).as_ptr()
 }
 
-/// Checks a model file of `length` bytes and creates the model in `model`, which has `size` bytes (sizeof *model).
+/// Checks a model file of `length` bytes and creates the model in `model`, which has `size` bytes (sizeof *model). A model that
+/// was there before lives on if the file is refused; nothing that was created from it may be in use during the call.
 ///
 /// The bytes stay where they are, in flash for instance: they must live and keep unchanged as long as the model. They should
 /// start at a multiple of 16 bytes; elsewhere they are read by slower kernels, with the same results. Needs up to 4 KB of stack
@@ -32,12 +36,39 @@ pub unsafe extern "C" fn impromptu_model_create(model: *mut ModelMemory, size: u
     };
     // SAFETY: the module's rules.
     unsafe {
-        create::<Model<'static>>(model, size, |place| {
-            place.write(Model::EMPTY);
-            Model::load_into(&mut *place, bytes, &mut Scratch::new())?;
-            Ok(())
+        create::<Model<'static>>(model, size, |made| {
+            let before = view::<Model<'static>>(model).ok().map(Model::file);
+            load(made, bytes, before)
         })
     }
+}
+
+/// Makes a place for a model an empty one. On its way it may be on the stack, which is free again for the load.
+#[inline(never)]
+unsafe fn begin<'p>(made: Made<'p, Model<'static>>) -> Begun<'p, Model<'static>> {
+    // SAFETY: the module's rules.
+    unsafe { made.begin(Model::empty()) }
+}
+
+/// Loads a model, or, if it is refused, the one that was there before, and says why; an error leaves none.
+#[inline(never)]
+fn fill(place: &mut Model<'static>, bytes: &'static [u8], before: Option<&'static [u8]>) -> Result<Option<Refusal>, Status> {
+    let mut scratch = Scratch::new();
+    let Err(refusal) = Model::load_into(place, bytes, &mut scratch) else { return Ok(None) };
+    match before {
+        // It passed every check before.
+        Some(file) if Model::load_into(place, file, &mut scratch).is_ok() => Ok(Some(refusal)),
+        _ => Err(refusal.into()),
+    }
+}
+
+/// Loads a model where it will live, or, if it is refused, the one again that was there before.
+unsafe fn load(made: Made<'_, Model<'static>>, bytes: &'static [u8], before: Option<&'static [u8]>) -> Result<(), Status> {
+    // SAFETY: the module's rules.
+    let mut place = unsafe { begin(made) };
+    let refusal = fill(place.value(), bytes, before)?;
+    place.finish();
+    refusal.map_or(Ok(()), |refusal| Err(refusal.into()))
 }
 
 /// What a model says of itself.
@@ -60,8 +91,8 @@ pub unsafe extern "C" fn impromptu_model_describe(model: *const ModelMemory, des
 pub unsafe extern "C" fn impromptu_scratch_create(scratch: *mut ScratchMemory, size: usize) -> Status {
     // SAFETY: the module's rules.
     unsafe {
-        create::<Scratch>(scratch, size, |place| {
-            place.write(Scratch::new());
+        create::<Scratch>(scratch, size, |made| {
+            made.write(Scratch::new());
             Ok(())
         })
     }

@@ -3,6 +3,7 @@
 use core::ffi::{CStr, c_char};
 
 use impromptu_firmware::{
+    caps,
     model::{self, SignalTable},
     preview::EndRule,
 };
@@ -10,7 +11,7 @@ use impromptu_firmware::{
 use super::{checked, input};
 use crate::{
     status::Status,
-    values::{Channel, MAX_CHANNELS, Signals},
+    values::{Cap, Channel, MAX_CHANNELS, Signals},
 };
 
 /// The application's table, compared with the model's by those who read it.
@@ -25,6 +26,21 @@ pub(super) unsafe fn table<'a>(signals: *const Signals) -> Result<SignalTable<'a
             reference: rows(signals.reference, signals.reference_count)?,
         })
     }
+}
+
+/// The application's bounds, one for each reference channel.
+pub(super) unsafe fn bounds(caps: *const Cap, count: usize) -> Result<heapless::Vec<caps::Cap, MAX_CHANNELS>, Status> {
+    let mut bounds = heapless::Vec::new();
+    let caps = checked(caps).map_err(|status| if status == Status::Null { Status::Caps } else { status })?;
+    if count > MAX_CHANNELS {
+        return Err(Status::Count);
+    }
+    for index in 0..count {
+        // SAFETY: `count` bounds are readable.
+        let Cap { limit, rate } = unsafe { input(caps.add(index))? };
+        let _ = bounds.push(caps::Cap { limit, rate });
+    }
+    Ok(bounds)
 }
 
 type Rows<'a> = heapless::Vec<model::Channel<'a>, MAX_CHANNELS>;

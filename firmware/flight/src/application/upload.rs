@@ -27,6 +27,11 @@ pub struct Upload {
 }
 
 impl Upload {
+    /// Whether a command concerns the flash.
+    pub fn is_made_of(command: &Command<'_>) -> bool {
+        matches!(command, Command::ModelBegin { .. } | Command::ModelChunk(_) | Command::ModelCommit)
+    }
+
     /// The upload's part of a command, if it is one.
     pub fn new(sequence: u8, command: &Command<'_>) -> Option<Self> {
         let mut words = [0; WORDS];

@@ -1,12 +1,14 @@
 //! Attitude loop.
 //!
-//! *in* a thrust vector and a state; *out* collective thrust and moment; *never* a memory of its own; *source* Lee, Leok,
-//! McClamroch 2010.
+//! *in* a thrust vector and a state; *out* collective thrust and moment; *never* a memory of its own, or a moment that is
+//! not finite for finite rates; *source* Lee, Leok, McClamroch 2010.
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::ThrustVector;
+use impromptu_firmware::math::clamp;
+
 use crate::types::State;
 
 /// Gains of the attitude loop, common to the three axes.
@@ -44,9 +46,30 @@ impl AttitudeLoop {
                 * (wanted.attitude.column(after).dot(&attitude.column(next))
                     - wanted.attitude.column(next).dot(&attitude.column(after)));
         }
-        let rates = state.rates;
+        // Beyond every gyroscope, so it changes no bit of a flight; the product of larger ones might be infinite.
+        let rates = state.rates.map(|rate| clamp(rate, -1e4, 1e4));
         let momentum = self.inertia.component_mul(&rates);
         let acceleration = error * -self.gains.kp - rates * self.gains.kd;
         (thrust, self.inertia.component_mul(&acceleration) + rates.cross(&momentum))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::UnitQuaternion;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn finite_rates_give_finite_moments(bits in any::<[u32; 3]>(), angles in prop::array::uniform3(-3.0f32..3.0)) {
+            let rates = bits.map(f32::from_bits);
+            prop_assume!(rates.iter().all(|x| x.is_finite()));
+            let baseline = AttitudeLoop::new(AttitudeGains { kp: 544.0, kd: 46.64 }, [1.43e-5, 1.43e-5, 2.89e-5]);
+            let attitude = UnitQuaternion::from_euler_angles(angles[0], angles[1], angles[2]);
+            let state = State { rates: rates.into(), attitude, ..State::ORIGIN };
+            let (thrust, moment) = baseline.step(&ThrustVector::NONE, &state);
+            prop_assert!(thrust.is_finite() && moment.iter().all(|x| x.is_finite()), "{moment:?}");
+        }
     }
 }

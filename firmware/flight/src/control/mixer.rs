@@ -5,7 +5,7 @@
 
 use nalgebra::{Matrix4, Vector3, Vector4};
 
-use super::Airframe;
+use super::{Airframe, GRAVITY};
 use impromptu_firmware::math;
 
 use crate::types::MotorCommand;
@@ -29,7 +29,23 @@ impl Mixer {
         let largest = airframe.thrust_coefficient * airframe.max_rotor_speed * airframe.max_rotor_speed;
         let inverse = Matrix4::from_columns(&columns).try_inverse()?;
         let fraction_squared = 1.0 / largest;
-        (inverse.iter().all(|x| x.is_finite()) && fraction_squared.is_finite()).then_some(Self { inverse, fraction_squared })
+        (inverse.iter().all(|x| x.is_finite()) && largest.is_normal() && fraction_squared.is_finite())
+            .then_some(Self { inverse, fraction_squared })
+    }
+
+    /// The share of its largest thrust that each rotor gives in hover; negative or above 1 if it cannot.
+    pub fn hover_shares(&self, mass: f32) -> [f32; 4] {
+        self.rotor_thrusts(mass * GRAVITY, &Vector3::zeros()).map(|force| force * self.fraction_squared)
+    }
+
+    /// How much thrust of a rotor a unit of moment takes at most, as a multiple of what a rotor with nothing else to do would
+    /// need: about a third for four rotors in a square, without bound for rotors that can hardly produce some moment.
+    pub fn effort(&self, airframe: &Airframe) -> f32 {
+        let arm = airframe.rotors.iter().fold(0.0, |longest: f32, [x, y]| longest.max(math::sqrt(x * x + y * y)));
+        let ratio = airframe.torque_coefficient / airframe.thrust_coefficient;
+        let column =
+            |index: usize, scale: f32| self.inverse.column(index).iter().fold(0.0, |m: f32, x| m.max(math::abs(x * scale)));
+        column(1, arm).max(column(2, arm)).max(column(3, ratio))
     }
 
     /// Thrust of each rotor, N, before any limit.

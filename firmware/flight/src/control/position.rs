@@ -1,15 +1,19 @@
 //! Position loop.
 //!
 //! *in* a reference and a state; *out* a thrust vector, at the reference's rate; *never* an attitude that is undefined: the last
-//! one stays; *source* Zhou 2017, section V-A.
+//! one stays; or a number that is not finite, whatever finite numbers came in; *source* Zhou 2017, section V-A.
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::GRAVITY;
-use impromptu_firmware::math::{self, clamp};
+use impromptu_firmware::math::{self, clamp, finite_or_zero};
 
 use crate::types::{Reference, State};
+
+/// Largest errors, accelerations and integrals that the loop computes with, SI: far beyond what a vehicle within the limits of
+/// [`crate::types`] has, so that they change no bit of a flight, and small enough that no product of them is infinite.
+const LARGEST: f32 = 1e6;
 
 /// Gains of the position loop, for each axis of the world frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -65,6 +69,11 @@ impl PositionLoop {
         }
     }
 
+    /// Its gains.
+    pub fn gains(&self) -> &PositionGains {
+        &self.gains
+    }
+
     /// As it was made, in place.
     pub fn reset(&mut self) {
         (self.integral, self.yaw, self.heading, self.attitude) = (Vector3::zeros(), 0.0, Vector3::x(), Matrix3::identity());
@@ -72,15 +81,16 @@ impl PositionLoop {
 
     /// Nonlinear transformation: the acceleration that PD (and integral) ask for, plus gravity, as a thrust vector.
     pub fn step(&mut self, reference: &Reference, state: &State) -> ThrustVector {
-        let position_error = reference.position - state.position;
-        let velocity_error = reference.velocity - state.velocity;
+        let position_error = (reference.position - state.position).map(bounded);
+        let velocity_error = (reference.velocity - state.velocity).map(bounded);
         let mut acceleration = Vector3::new(0.0, 0.0, GRAVITY);
         let limit = self.gains.integral_limit;
         for axis in 0..3 {
-            let step = self.gains.ki[axis] * position_error[axis] * self.dt;
-            self.integral[axis] = clamp(self.integral[axis] + step, -limit, limit);
-            acceleration[axis] +=
-                self.gains.kp[axis] * position_error[axis] + self.gains.kd[axis] * velocity_error[axis] + self.integral[axis];
+            let step = bounded(self.gains.ki[axis] * position_error[axis] * self.dt);
+            self.integral[axis] = bounded(clamp(self.integral[axis] + step, -limit, limit));
+            acceleration[axis] += bounded(
+                self.gains.kp[axis] * position_error[axis] + self.gains.kd[axis] * velocity_error[axis] + self.integral[axis],
+            );
         }
         if reference.yaw.to_bits() != self.yaw.to_bits() {
             // Yaw mostly stands still.
@@ -96,6 +106,12 @@ impl PositionLoop {
     }
 }
 
+/// The number, if it is one and of a size to compute with.
+#[inline(always)]
+fn bounded(x: f32) -> f32 {
+    clamp(finite_or_zero(x), -LARGEST, LARGEST)
+}
+
 /// Attitude whose third axis is along `force`; `None` if that is undefined (free fall, or force along the heading).
 fn aligned(force: &Vector3<f32>, heading: &Vector3<f32>) -> Option<Matrix3<f32>> {
     let z = unit(force)?;
@@ -106,4 +122,53 @@ fn aligned(force: &Vector3<f32>, heading: &Vector3<f32>) -> Option<Matrix3<f32>>
 fn unit(vector: &Vector3<f32>) -> Option<Vector3<f32>> {
     let length = math::sqrt(vector.dot(vector));
     (length > 1e-6).then(|| vector * (1.0 / length))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Any finite number, huge and tiny ones included.
+    fn finite() -> impl Strategy<Value = f32> {
+        any::<u32>().prop_map(f32::from_bits).prop_filter("finite", |x| x.is_finite())
+    }
+
+    fn three() -> impl Strategy<Value = Vector3<f32>> {
+        prop::array::uniform3(prop_oneof![finite(), Just(f32::MAX), Just(f32::MIN)]).prop_map(Vector3::from)
+    }
+
+    fn gains() -> PositionGains {
+        PositionGains { kp: [6.5, 6.5, 15.0], kd: [4.0, 4.0, 9.0], ki: [1.0; 3], integral_limit: 1.0 }
+    }
+
+    proptest! {
+        #[test]
+        fn no_finite_number_makes_one_that_is_not(
+            samples in prop::collection::vec((three(), three(), three(), three(), finite()), 1..6),
+            wild in prop::option::of((three(), finite())),
+        ) {
+            let mut gains = gains();
+            if let Some((numbers, limit)) = wild {
+                gains = PositionGains { kp: numbers.into(), kd: numbers.into(), ki: numbers.into(), integral_limit: limit };
+            }
+            let mut baseline = PositionLoop::new(gains, 0.03, 100.0);
+            for (p, v, position, velocity, yaw) in samples {
+                let reference = Reference { position: p, velocity: v, yaw };
+                let wanted = baseline.step(&reference, &State { position, velocity, ..State::ORIGIN });
+                prop_assert!(wanted.force.iter().chain(wanted.attitude.iter()).all(|x| x.is_finite()), "{wanted:?}");
+                prop_assert!(baseline.integral.iter().all(|x| x.is_finite()));
+            }
+        }
+
+        #[test]
+        fn what_is_huge_for_a_tick_is_forgotten_afterwards(sign in prop::sample::select(vec![-1.0f32, 1.0])) {
+            let mut baseline = PositionLoop::new(PositionGains { ki: [0.0; 3], ..gains() }, 0.03, 100.0);
+            let before = baseline.step(&Reference::ORIGIN, &State::ORIGIN);
+            let far = Vector3::new(3.3e38 * sign, 0.0, 0.0);
+            let there = State { position: -far, ..State::ORIGIN };
+            baseline.step(&Reference { position: far, ..Reference::ORIGIN }, &there);
+            prop_assert_eq!(baseline.step(&Reference::ORIGIN, &State::ORIGIN), before);
+        }
+    }
 }

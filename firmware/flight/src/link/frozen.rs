@@ -6,16 +6,16 @@
 use super::{
     Command, FRAME, Outcome, Reason, Report, VERSION, encode,
     message::{
-        FlyingModel, FrameReport, Identity, Inertial, LaneReport, ModelChunk, Motors, Position, TRIP_REASONS, Telemetry,
-        TimedSetpoint,
+        FlyingModel, FrameReport, Identity, Inertial, InputReport, LaneReport, ModelChunk, Motors, Position, TRIP_REASONS,
+        Telemetry, TimedSetpoint,
     },
-    outcome::ModelFault,
+    outcome::{ModelFault, Quantity},
 };
 use impromptu_firmware::adapter::Lanes;
 
 use crate::{
     control::{Airframe, AttitudeGains, PositionGains},
-    settings::{Rates, Settings},
+    settings::{Rates, Setting, Settings},
 };
 
 /// Numbers that no two fields share.
@@ -24,7 +24,7 @@ fn numbers<const N: usize>(first: f32) -> [f32; N] {
 }
 
 /// One of each command.
-pub(super) fn commands() -> [Command<'static>; 11] {
+pub(super) fn commands() -> [Command<'static>; 13] {
     let airframe = Airframe {
         mass: 0.5,
         inertia: numbers(1.0),
@@ -55,6 +55,14 @@ pub(super) fn commands() -> [Command<'static>; 11] {
         Command::ModelBegin { length: 54_321, checksum: 0xcbf4_3926 },
         Command::ModelChunk(ModelChunk { offset: 192, bytes: b"model\0" }),
         Command::ModelCommit,
+        Command::Replan(TimedSetpoint {
+            tick: 303,
+            position: numbers(1.0),
+            velocity: numbers(2.0),
+            acceleration: numbers(3.0),
+            yaw: -4.0,
+        }),
+        Command::Brake,
     ]
 }
 
@@ -85,6 +93,11 @@ pub(super) fn reports() -> Vec<Report<'static>> {
         Reason::Model(ModelFault::Preview { needed: 200 }),
         Reason::Model(ModelFault::Rate),
         Reason::Busy,
+        Reason::Setting { what: Setting::Mass },
+        Reason::Setting { what: Setting::Hover },
+        Reason::Range { what: Quantity::Position },
+        Reason::Range { what: Quantity::Yaw },
+        Reason::Braking,
     ];
     let mut reports = vec![
         Report::Identity(Identity::new("impromptu 1", None)),
@@ -109,6 +122,7 @@ pub(super) fn reports() -> Vec<Report<'static>> {
         Report::Acknowledge { sequence: 255, outcome: Outcome::Done },
     ];
     reports.extend(reasons.map(|reason| Report::Acknowledge { sequence: 7, outcome: Outcome::Refused(reason) }));
+    reports.push(Report::Inputs(InputReport { tick: 402, refused: 300, reach: -3, braking: true }));
     reports
 }
 
@@ -127,6 +141,8 @@ const PAYLOADS: &str = "
     01a508b1a803a6f2d0df0c
     01a509c001066d6f64656c00
     01a50a
+    01a50bde040000803f0000a03f0000c03f000000400000104000002040000040400000504000006040000080c0
+    01a50c
     01a500010b696d70726f6d707475203100
     01a500010b696d70726f6d7074752031010866696775726520388486880800
     01a500010b696d70726f6d707475203101086669677572652038848688080101
@@ -155,6 +171,12 @@ const PAYLOADS: &str = "
     01a50307010e05c801
     01a50307010e06
     01a50307010f
+    01a50307011000
+    01a50307011012
+    01a50307011100
+    01a50307011104
+    01a503070112
+    01a5049203ac020501
 ";
 /// One frame, with stuffing, check sum and zero.
 const FRAME_OF_LANES: &str = "0501a505010530c4279e00";
@@ -211,7 +233,7 @@ fn the_largest_of_every_message_fits() {
     for report in [telemetry, identity] {
         assert!(encode(&report, 0, &mut buffer).is_some(), "{report:?}");
     }
-    let [.., Command::Settings(mut settings), _, _, _, _, _, _] = commands() else { unreachable!() };
+    let [.., Command::Settings(mut settings), _, _, _, _, _, _, _, _] = commands() else { unreachable!() };
     settings.rates.position_divisor = most;
     let chunk = ModelChunk { offset: most, bytes: &[1; super::CHUNK] };
     for command in [Command::Settings(settings), Command::ModelChunk(chunk)] {

@@ -14,7 +14,7 @@ use impromptu_firmware::adapter::Lanes;
 use crate::settings::Settings;
 
 pub use command::{Inertial, ModelChunk, Position, TimedSetpoint};
-pub use report::{FlyingModel, FrameReport, Identity, LaneReport, Motors, TRIP_REASONS, Telemetry};
+pub use report::{FlyingModel, FrameReport, Identity, InputReport, LaneReport, Motors, TRIP_REASONS, Telemetry};
 
 /// A message of either direction.
 pub trait Message: Serialize {
@@ -81,6 +81,11 @@ pub enum Command<'a> {
     ModelChunk(ModelChunk<'a>),
     /// The file is complete: check it, and fly it from now on.
     ModelCommit,
+    /// The first setpoint of another trajectory, which replaces what is stored from its tick on; the next ones follow as
+    /// [`Command::Setpoint`]. The vehicle goes from one to the other without a jump.
+    Replan(TimedSetpoint),
+    /// Come to rest from where the trajectory is now, and stay there until a [`Command::Replan`].
+    Brake,
 }
 
 /// A message from the vehicle.
@@ -100,4 +105,6 @@ pub enum Report<'a> {
         /// What became of it.
         outcome: Outcome,
     },
+    /// What became of what it was told; with each telemetry.
+    Inputs(InputReport),
 }

@@ -10,6 +10,11 @@ use serde::{Deserialize, Serialize};
 use super::CHUNK;
 use impromptu_firmware::model::Refusal;
 
+use crate::{
+    settings::Setting,
+    types::{ACCELERATION_LIMIT, POSITION_LIMIT, RATE_LIMIT, VELOCITY_LIMIT, YAW_LIMIT},
+};
+
 /// What became of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Outcome {
@@ -67,6 +72,46 @@ pub enum Reason {
     Model(ModelFault),
     /// A piece of a model is in work, or a new model waits for the restart.
     Busy,
+    /// No vehicle has this setting, or this board another one ([`Setting::ControlRate`]); the settings stay as they were.
+    Setting {
+        /// Which one.
+        what: Setting,
+    },
+    /// No vehicle measures such a number, or can be asked for it.
+    Range {
+        /// Which one.
+        what: Quantity,
+    },
+    /// The vehicle brakes, or rests where it has braked.
+    Braking,
+}
+
+/// What a number of a state or a setpoint is of. New ones come last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Quantity {
+    /// At most [`POSITION_LIMIT`].
+    Position,
+    /// At most [`VELOCITY_LIMIT`].
+    Velocity,
+    /// At most [`ACCELERATION_LIMIT`].
+    Acceleration,
+    /// At most [`RATE_LIMIT`].
+    Rates,
+    /// At most [`YAW_LIMIT`].
+    Yaw,
+}
+
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Position => write!(f, "a position beyond {POSITION_LIMIT} m"),
+            Self::Velocity => write!(f, "a velocity beyond {VELOCITY_LIMIT} m/s"),
+            Self::Acceleration => write!(f, "an acceleration beyond {ACCELERATION_LIMIT} m/s²"),
+            Self::Rates => write!(f, "a body rate beyond {RATE_LIMIT} rad/s"),
+            Self::Yaw => write!(f, "a yaw beyond {YAW_LIMIT} rad"),
+        }
+    }
 }
 
 /// Why a model is not flown: [`Refusal`] without what only the file's maker needs.
@@ -139,6 +184,12 @@ impl fmt::Display for Reason {
             Self::Busy => {
                 write!(f, "a piece of a model is being stored, or a new model waits for the restart: say it again later")
             }
+            Self::Setting { what: Setting::ControlRate } => {
+                write!(f, "the control rate is not the board's, or none that a loop has: send the board's")
+            }
+            Self::Setting { what } => write!(f, "no vehicle has this {}: correct it, nothing was changed", what.name()),
+            Self::Range { what } => write!(f, "{what}: check its unit and what computes it; the sample counts as lost"),
+            Self::Braking => write!(f, "the vehicle has braked: begin another trajectory with a re-plan"),
         }
     }
 }

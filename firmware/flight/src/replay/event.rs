@@ -98,7 +98,9 @@ impl Event {
     /// Makes the call again, unless it is a tick (whose answer the caller wants) or the end.
     pub fn prepare(&self, flight: &mut Flight<'_>) {
         match self {
-            Self::Setpoint(setpoint) => flight.push_setpoint(setpoint),
+            Self::Setpoint(setpoint) => {
+                flight.push_setpoint(setpoint);
+            }
             Self::Dither(offset) => flight.set_dither(*offset),
             Self::Lanes(lanes) => {
                 if let Some(adapter) = flight.adapter() {

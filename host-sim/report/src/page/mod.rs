@@ -14,7 +14,7 @@ use crate::{
     results::Results,
 };
 use anyhow::Context as _;
-use impromptu_model_export::replacement::replace;
+use impromptu_files::replacement::replace;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use std::path::Path;
 
@@ -25,6 +25,7 @@ const STYLE: &str = include_str!("style.css");
 /// # Errors
 /// When a plot cannot be drawn; the message names it.
 pub fn render_html(results: &Results) -> anyhow::Result<String> {
+    let results = &results.harmless();
     let cases = Case::group(&results.table);
     let methods = methods(&results.table);
     let scenes = Scene::group(&results.flights);

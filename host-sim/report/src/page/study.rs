@@ -14,6 +14,7 @@ use crate::{
 /// # Errors
 /// When a figure cannot be drawn; the message names it.
 pub fn render_study(study: &Study) -> anyhow::Result<String> {
+    let study = &study.harmless();
     let mut panels = Vec::new();
     for figure in &study.figures {
         panels.extend(draw(figure)?.map(|panel| (figure, panel)));

@@ -1,5 +1,10 @@
 //! The page as a whole, on invented results.
 
+use crate::{
+    figure::{Axis, Curve, Figure},
+    study::Study,
+};
+use proptest::prelude::*;
 use std::fs;
 
 use super::*;
@@ -100,4 +105,69 @@ fn a_failed_write_leaves_the_old_file_and_names_it() {
     let message = format!("{:#}", write_html(&fixture::small(), &path).unwrap_err());
     assert!(message.contains("report.html"), "{message}");
     assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
+}
+
+/// Numbers that no flight has, and that files can hold all the same.
+fn insane() -> impl Strategy<Value = f64> {
+    let magnitude = prop_oneof![
+        Just(0.0),
+        Just(5e-324),
+        Just(1e-300),
+        Just(1.0),
+        Just(1.0 + f64::EPSILON),
+        Just(1e12),
+        Just(1e12 - 1e-4),
+        Just(1e15),
+        Just(1e155),
+        Just(1e308),
+        Just(f64::MAX),
+        Just(f64::INFINITY),
+        Just(f64::NAN),
+        -5.0..5.0,
+    ];
+    (magnitude, any::<bool>()).prop_map(|(value, negative): (f64, bool)| if negative { -value } else { value })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+    #[test]
+    fn a_page_of_insane_numbers_is_made_in_bounded_time(
+        values in proptest::collection::vec(insane(), 24),
+        rate_hz in insane(),
+        speed in insane(),
+        axis_only in any::<bool>(),
+    ) {
+        let mut results = fixture::full();
+        results.flights.truncate(2);
+        let mut next = values.iter().copied().cycle();
+        for trace in &mut results.flights {
+            (trace.rate_hz, trace.scored) = (rate_hz, 1..7);
+            for points in [&mut trace.desired, &mut trace.flown, &mut trace.reference] {
+                points.truncate(8);
+                points.iter_mut().flatten().for_each(|value| *value = if axis_only { values[0] } else { next.next().unwrap() });
+            }
+        }
+        for row in &mut results.table {
+            (row.speed, row.rms_cm_mean, row.reduction_mean, row.reduction_worst) = (speed, values[0], values[1], values[2]);
+        }
+        for flight in &mut results.per_flight {
+            (flight.speed, flight.rms_cm, flight.reduction) = (speed, next.next().unwrap(), next.next().unwrap());
+        }
+        let started = std::time::Instant::now();
+        let page = render_html(&results).unwrap();
+        prop_assert!(page.ends_with("</html>") && page.len() < 4_000_000, "{} bytes", page.len());
+        prop_assert!(started.elapsed().as_secs() < 10);
+        let figure = |logarithmic| Figure {
+            section: "s".into(),
+            name: "n".into(),
+            title: "t".into(),
+            x: Axis { label: "x".into(), logarithmic },
+            y: Axis { label: "y".into(), logarithmic },
+            curves: vec![Curve::line_and_dots("c", values.chunks(2).map(|pair| (pair[0], pair[1])))],
+        };
+        let mut study = Study::new("t", "c", 1);
+        study.draw(figure(false));
+        study.draw(figure(true));
+        prop_assert!(render_study(&study).unwrap().len() < 1_000_000);
+    }
 }

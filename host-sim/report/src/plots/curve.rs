@@ -1,29 +1,42 @@
-//! Polylines: gaps where a number is not finite, and no more points than the eye can see.
+//! Polylines: gaps where a number is not finite or is none that a plot can show, and no more points than the eye can see.
 
 use std::ops::Range;
 
 pub(super) type Point = (f64, f64);
 
-/// The smallest interval that holds all finite values, or `None` without one.
+/// Largest magnitude that has a place in a plot: beyond it differences and squares of differences leave the numbers, and no
+/// quantity here has such values in any unit. What is larger is a gap, as what is not finite.
+const LARGEST: f64 = 1e12;
+/// Least extent of an axis over its largest magnitude: neighbouring ticks must be different numbers.
+const LEAST_SHARE: f64 = 1e-6;
+
+/// Whether a value has a place in a plot.
+pub(super) fn shown(value: f64) -> bool {
+    value.abs() <= LARGEST
+}
+
+/// The smallest interval that holds all values that have a place, or `None` without one.
 pub(super) fn span(values: impl IntoIterator<Item = f64>) -> Option<Range<f64>> {
-    values.into_iter().filter(|value| value.is_finite()).fold(None, |span, value| match span {
+    values.into_iter().filter(|value| shown(*value)).fold(None, |span, value| match span {
         None => Some(value..value),
         Some(Range { start, end }) => Some(start.min(value)..end.max(value)),
     })
 }
 
-/// Widens an interval by a share of its length at either end, and to at least `least`.
+/// Widens an interval by a share of its length at either end, and to at least `least`, which is raised to what can be told apart
+/// at this distance from 0.
 pub(super) fn widened(span: &Range<f64>, share: f64, least: f64) -> Range<f64> {
     let centre = 0.5 * (span.start + span.end);
+    let least = least.max(LEAST_SHARE * span.start.abs().max(span.end.abs()));
     let half = (0.5 + share) * (span.end - span.start).max(least);
     centre - half..centre + half
 }
 
-/// Splits at points that are not finite, and thins each piece: no dropped point is further than `tolerance`
+/// Splits at points that have no place, and thins each piece: no dropped point is further than `tolerance`
 /// (in each axis' own unit) from the line that is left. Ramer, Douglas and Peucker's method.
 pub(super) fn polylines(points: &[Point], tolerance: (f64, f64)) -> Vec<Vec<Point>> {
     points
-        .split(|point| !(point.0.is_finite() && point.1.is_finite()))
+        .split(|point| !(shown(point.0) && shown(point.1)))
         .filter(|piece| piece.len() > 1)
         .map(|piece| thinned(piece, tolerance))
         .collect()

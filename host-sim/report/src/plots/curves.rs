@@ -6,7 +6,7 @@ use plotters::prelude::*;
 use super::{
     axes::{Labels, axes_with, curve, decimals},
     canvas::{Ink, panel, units},
-    curve::{Point, span, widened},
+    curve::{Point, shown, span, widened},
 };
 use crate::{
     figure::{Axis, Figure, Mark},
@@ -51,7 +51,7 @@ pub(crate) fn draw(figure: &Figure) -> anyhow::Result<Option<Markup>> {
         .iter()
         .map(|curve| curve.points.iter().map(|&(x, y)| (place(&figure.x, x), place(&figure.y, y))).collect())
         .collect();
-    let all = || placed.iter().flatten().filter(|point| point.0.is_finite() && point.1.is_finite());
+    let all = || placed.iter().flatten().filter(|point| shown(point.0) && shown(point.1));
     let (Some(x), Some(y)) = (span(all().map(|point| point.0)), span(all().map(|point| point.1))) else { return Ok(None) };
     let least = |span: &std::ops::Range<f64>| (span.start.abs().max(span.end.abs()) * 1e-3).max(1e-12);
     let (x, y) = (widened(&x, 0.02, least(&x)), widened(&y, 0.06, least(&y)));
@@ -66,7 +66,7 @@ pub(crate) fn draw(figure: &Figure) -> anyhow::Result<Option<Markup>> {
                 curve(&mut chart, points, ink.line(1.5))?;
             }
             if data.mark != Mark::Line {
-                let seen = points.iter().filter(|point| point.0.is_finite() && point.1.is_finite());
+                let seen = points.iter().filter(|point| shown(point.0) && shown(point.1));
                 chart.draw_series(seen.map(|&point| Circle::new(point, units(2.6), ink.fill())))?;
             }
         }

@@ -74,11 +74,9 @@ pub(crate) fn path_in_space(scene: &Scene<'_>) -> anyhow::Result<Option<Markup>>
     };
     // One metre is as long across as it is up.
     let (width, height) = inner_size(SIZE);
-    let metres_per_pixel = ((x.end - x.start) / width).max((y.end - y.start) / height).max(1e-6);
-    let (x, y) = (
-        about_centre(&widened(&x, 0.0, 1e-6), 1.08 * metres_per_pixel * width),
-        about_centre(&widened(&y, 0.0, 1e-6), 1.08 * metres_per_pixel * height),
-    );
+    let (x, y) = (widened(&x, 0.0, 1e-6), widened(&y, 0.0, 1e-6));
+    let metres_per_pixel = ((x.end - x.start) / width).max((y.end - y.start) / height);
+    let (x, y) = (about_centre(&x, 1.08 * metres_per_pixel * width), about_centre(&y, 1.08 * metres_per_pixel * height));
 
     let description = "Path over the scored part of the flight: desired, baseline and with the add-on.";
     let drawn = panel(SIZE, &first.trajectory, description, |area| {

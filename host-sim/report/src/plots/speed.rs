@@ -2,7 +2,7 @@
 
 use super::axes::{Labels, axes, curve};
 use super::canvas::{panel, units};
-use super::curve::{Point, span, widened};
+use super::curve::{Point, shown, span, widened};
 use super::rows::ink;
 use crate::{cases::Case, method::Method};
 use maud::Markup;
@@ -23,7 +23,7 @@ pub(crate) fn reduction_by_speed(cases: &[&Case<'_>]) -> anyhow::Result<Option<M
         .map(|method| {
             let rows = cases.iter().filter_map(|case| case.row(method));
             let mut points: Vec<Point> = rows.map(|row| (row.speed, row.reduction_mean)).collect();
-            points.retain(|point| point.0.is_finite() && point.1.is_finite());
+            points.retain(|point| shown(point.0) && shown(point.1));
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
             (method, points)
         })
@@ -42,7 +42,7 @@ pub(crate) fn reduction_by_speed(cases: &[&Case<'_>]) -> anyhow::Result<Option<M
     panel(SIZE, &title, description, |area| {
         let labels = Labels { x: "speed factor", y: "mean reduction [%]" };
         let floor = widened(&value, 0.05, 5.0).start;
-        let mut chart = axes(area, widened(&speed, 0.06, 0.1), floor..100.0_f64.max(value.end), &labels)?;
+        let mut chart = axes(area, widened(&speed, 0.06, 0.1), floor..widened(&value, 0.0, 1.0).end.max(100.0), &labels)?;
         for (method, points) in &lines {
             curve(&mut chart, points, ink(*method).line(1.8))?;
             let dots = points.iter().map(|point| Circle::new(*point, units(3.2), ink(*method).fill()));

@@ -101,9 +101,9 @@ fn plot(
     };
     let mut value = widened(&value, 0.06, least);
     if quantity.starts_with("error") {
-        value = 0.0..value.end;
+        value = 0.0..value.end.max(least);
     }
-    let time = time.start..time.end.max(time.start + 1e-3);
+    let time = time.start..widened(&time, 0.0, 1e-3).end;
     let scored = shaded(trace, &time);
     panel(size, title, description, |area| {
         let mut chart = axes(area, time, value.clone(), &Labels { x: "time [s]", y: quantity })?;

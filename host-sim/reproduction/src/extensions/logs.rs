@@ -1,5 +1,6 @@
 //! Real flight logs.
 
+use impromptu_files::reading;
 use std::{fs, path::Path};
 
 use crate::siso::extensions::{
@@ -54,7 +55,7 @@ pub(super) fn load(folder: Option<&Path>) -> Result<Vec<Flight>> {
     paths
         .iter()
         .map(|path| {
-            let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+            let text = reading::read_text(path, reading::TABLE).with_context(|| format!("cannot read {}", path.display()))?;
             let name = path.file_stem().unwrap_or_default().to_string_lossy();
             Ok(Flight::parse(&name, &text)?)
         })

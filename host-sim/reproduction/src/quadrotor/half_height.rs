@@ -6,11 +6,13 @@
 use impromptu_firmware::{
     AddOn,
     adapter::Lanes,
+    caps::Caps,
     guard::{GuardSettings, Trips},
     model::{Model, Refusal},
     network::Scratch,
 };
 use impromptu_flight::{
+    caps,
     flight::{Flight, PREVIEW, Settings},
     quadrotor::{self, DESIRED, MEASURED, REFERENCE},
     types::{MotorCommand, Reference, Setpoint, State, Tick},
@@ -39,7 +41,9 @@ impl<'m> HalfHeight<'m> {
         let (mut add_on, signals) = (AddOn::empty(), quadrotor::signals());
         match model {
             Some(model) => {
-                add_on.load(model, signals, settings.rates.reference_hz())?;
+                let sums = caps::sums(&settings.position);
+                let caps = Caps { channels: &caps::CHANNELS, sums: &sums };
+                add_on.load(model, signals, settings.rates.reference_hz(), &caps)?;
                 add_on.set_guard(GuardSettings::OFF);
                 add_on.switch(Lanes { network: true, feedback: false });
             }

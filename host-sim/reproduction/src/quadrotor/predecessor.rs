@@ -57,6 +57,7 @@ mod tests {
     #[test]
     fn a_tick_of_the_add_on_lasts_150_ms_and_the_link_100_ms() {
         let closed_loop = predecessor().unwrap();
+        assert_eq!(closed_loop.settings.check(), Ok(()));
         assert!((f64::from(DIVISOR) / closed_loop.rate_hz() - 0.15).abs() < 1e-6);
         assert_eq!(closed_loop.condition.command_delay_ticks(closed_loop.settings.rates.control_hz.into()), 40);
     }

@@ -51,15 +51,21 @@ impl Default for Ranges {
 }
 
 impl Ranges {
-    /// The first range that no vehicle can be drawn from, and why.
+    /// The first range that no vehicle can be drawn from: its values and what is allowed.
     pub fn fault(&self) -> Option<String> {
-        let factors = [("mass", self.mass), ("thrust", self.thrust), ("inertia", self.inertia), ("motor_lag", self.motor_lag)];
-        let others = [("drag", self.drag), ("delay_s", self.delay_s), ("wind", self.wind)];
-        let ordered = |[low, high]: [f64; 2]| low.is_finite() && high.is_finite() && low <= high;
-        let positive = factors.iter().find(|(_, range)| !ordered(*range) || range[0] <= 0.0);
-        let positive = positive.map(|(name, _)| format!("`{name}` must be two factors above 0, the smaller one first"));
-        let rest = others.iter().find(|(_, range)| !ordered(*range) || range[0] < 0.0);
-        positive.or(rest.map(|(name, _)| format!("`{name}` must be two numbers, 0 or more, the smaller one first")))
+        let allowed = [
+            ("mass", self.mass, 0.1, 10.0),
+            ("thrust", self.thrust, 0.1, 10.0),
+            ("drag", self.drag, 0.0, 100.0),
+            ("inertia", self.inertia, 0.1, 10.0),
+            ("motor_lag", self.motor_lag, 0.1, 10.0),
+            ("delay_s", self.delay_s, 0.0, 0.5),
+            ("wind", self.wind, 0.0, 50.0),
+        ];
+        // Written so that what is not a number is refused as well.
+        let fits = |[from, to]: [f64; 2], low: f64, high: f64| low <= from && from <= to && to <= high;
+        let (name, [from, to], low, high) = allowed.into_iter().find(|(_, range, low, high)| !fits(*range, *low, *high))?;
+        Some(format!("`{name}` is [{from}, {to}]; it must be two numbers from {low} to {high}, the smaller one first"))
     }
 }
 

@@ -107,7 +107,8 @@ impl Hover<'_> {
 
     /// Rotor commands (rad/s) of the flight stack in a control tick with a reference tick.
     fn commands(&self, state: &State) -> Result<[f64; ROTORS], RolloutError> {
-        let refuse = || RolloutError::Airframe(self.closed_loop.vehicle.name.clone());
+        let name = &self.closed_loop.vehicle.name;
+        let refuse = || RolloutError::Airframe(format!("`{name}`: no vehicle has its settings; check its constants and gains"));
         let mut flight = Flight::new(&self.closed_loop.settings).ok_or_else(refuse)?;
         for _ in 0..PREVIEW / 2 {
             flight.push_setpoint(&Setpoint::default());

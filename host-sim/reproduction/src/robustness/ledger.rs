@@ -1,7 +1,8 @@
 //! The file of a Monte Carlo run: a header and a line for each draw, as JSON.
 //!
 //! *in* draws as they are flown, files of shards; *out* a file that a later run goes on with, and one file of all shards; *never*
-//! draws of different settings or seeds in one file, and merged shards differ in no byte from a single run; *source* JSON Lines.
+//! draws of different settings or seeds in one file, or a name from a file that leads out of a folder, and merged shards differ
+//! in no byte from a single run; *source* JSON Lines.
 
 mod error;
 
@@ -13,10 +14,17 @@ use std::{
     str::FromStr,
 };
 
+use impromptu_files::{
+    name::{NameError, plain},
+    place, reading,
+};
 use serde::{Deserialize, Serialize};
 
-use super::draw::{Draw, DrawSettings};
+use super::draw::{Draw, DrawSettings, slug};
 pub use error::LedgerError;
+
+/// Most parts of a run.
+const MOST_PARTS: u32 = 100_000;
 
 /// One of `of` parts of a run, from 1: draws `part - 1`, `part - 1 + of`, and so on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -44,8 +52,8 @@ impl FromStr for Shard {
     fn from_str(text: &str) -> Result<Self, String> {
         let numbers = text.split_once('/').and_then(|(part, of)| Some((part.parse().ok()?, of.parse().ok()?)));
         match numbers {
-            Some((part, of)) if (1..=of).contains(&part) => Ok(Self { part, of }),
-            _ => Err("expected a part and how many there are, from 1/1 on, as 3/16".into()),
+            Some((part, of)) if (1..=of).contains(&part) && of <= MOST_PARTS => Ok(Self { part, of }),
+            _ => Err(format!("expected a part and how many there are, from 1/1 on, as 3/16, at most {MOST_PARTS}")),
         }
     }
 }
@@ -83,8 +91,9 @@ impl Ledger {
     /// # Errors
     /// If it is of other settings, of another part, or damaged before its last line.
     pub fn resume(path: &Path, header: &Header) -> Result<Self, LedgerError> {
+        place::check(path).map_err(at(path))?;
         let first = line(header).map_err(at(path))?;
-        let bytes = match std::fs::read(path) {
+        let bytes = match reading::read(path, reading::TABLE) {
             Err(error) if error.kind() == ErrorKind::NotFound => Vec::new(),
             read => read.map_err(at(path))?,
         };
@@ -136,6 +145,19 @@ impl Ledger {
 }
 
 impl Header {
+    /// Name of the run's file, without its ending.
+    ///
+    /// # Errors
+    /// If the loop in it is called such that no file can be.
+    pub fn name(&self) -> Result<String, NameError> {
+        let whole = format!("draws-{}", slug(&self.settings.nominal));
+        let name = match self.shard {
+            Shard::WHOLE => whole,
+            Shard { part, of } => format!("{whole}-{part}-of-{of}"),
+        };
+        plain(&name).map(str::to_owned)
+    }
+
     /// Nothing if a file's header is the one wanted, else the first key that differs.
     fn expect(&self, wanted: &Self, file: &Path) -> Result<(), LedgerError> {
         let differs = |key: &str, found: String, wanted: String| LedgerError::Settings {
@@ -177,7 +199,7 @@ impl Content {
     /// # Errors
     /// If it cannot be read or is damaged before its last line.
     pub fn read(path: &Path) -> Result<Self, LedgerError> {
-        Self::of(path, &std::fs::read(path).map_err(at(path))?)
+        Self::of(path, &reading::read(path, reading::TABLE).map_err(at(path))?)
     }
 
     fn of(path: &Path, bytes: &[u8]) -> Result<Self, LedgerError> {
@@ -190,8 +212,12 @@ impl Content {
             Some(first) => serde_json::from_str(first).map_err(|error| damaged(1, &error))?,
             None => return Err(damaged(1, &"there is no header")),
         };
+        header.name().map_err(|error| damaged(1, &format!("`nominal`: {error}")))?;
+        if let Some(fault) = header.settings.ranges.fault() {
+            return Err(damaged(1, &fault));
+        }
         let Shard { part, of } = header.shard;
-        if !(1..=of).contains(&part) {
+        if !(1..=of).contains(&part) || of > MOST_PARTS {
             return Err(damaged(1, &format!("there is no part {part} of {of}")));
         }
         let (mut draws, mut kept) = (Vec::new(), Vec::new());

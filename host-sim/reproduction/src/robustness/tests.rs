@@ -207,10 +207,28 @@ fn shards_that_do_not_make_one_run_are_not_merged() {
     assert!(message.contains("part 3 of 3 holds 1 of its 2 draws") && message.contains("--shard 3/3"), "{message}");
 }
 
+/// Every name from a file that becomes a path is a plain file name.
+#[test]
+fn a_file_whose_loop_leads_out_of_a_folder_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = fly(folder.path(), "run", 1, Shard::WHOLE).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    let nominal = "\"nominal\":\"crazyflie stock lab\"";
+    assert!(text.contains(nominal));
+    for name in ["x/../..", "/etc/x", "..\\\\x", "a\\u001b[2Jb", "a\\nb", &"x".repeat(300)] {
+        std::fs::write(&path, text.replace(nominal, &format!("\"nominal\":\"{name}\""))).unwrap();
+        let message = merge(std::slice::from_ref(&path)).unwrap_err().to_string();
+        assert!(message.contains("line 1: `nominal`: ") && message.contains("no plain file name"), "{name}: {message}");
+    }
+    std::fs::write(&path, text.replace("\"mass\":[0.95,", "\"mass\":[-1e308,")).unwrap();
+    let message = merge(std::slice::from_ref(&path)).unwrap_err().to_string();
+    assert!(message.contains("`mass` is [") && message.contains("from 0.1 to 10"), "{message}");
+}
+
 #[test]
 fn a_shard_is_a_part_of_a_whole() {
     assert_eq!("3/16".parse(), Ok(Shard { part: 3, of: 16 }));
-    for text in ["0/16", "17/16", "3", "a/b", "1/0"] {
+    for text in ["0/16", "17/16", "3", "a/b", "1/0", "1/4000000000"] {
         assert!(text.parse::<Shard>().is_err(), "{text}");
     }
 }

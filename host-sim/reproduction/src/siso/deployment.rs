@@ -74,10 +74,12 @@ pub fn model_file(
             fade_s: 0.0,
         },
         features: set.features.clone(),
-        outputs: vec![Output { channel: 0, limit: f32::MAX, slew: f32::MAX }],
+        // As good as none: the paper's loops have no limits.
+        outputs: vec![Output { channel: 0, limit: 1e6, slew: 1e6 }],
         envelope: rows.envelope().iter().map(|(low, high)| (*low as f32, *high as f32)).collect(),
         feedback_lane: None,
         monitor: None,
+        tie: None,
     };
     encode(&description, Some(&float_network(network)), precision, &rows.narrow())
 }

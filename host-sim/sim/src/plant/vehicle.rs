@@ -136,17 +136,24 @@ pub enum VehicleError {
         known: String,
     },
     /// The text is not TOML, or a field is missing, unknown or of the wrong type.
-    #[error("vehicle file: {0}")]
-    Syntax(#[from] toml::de::Error),
+    #[error("vehicle file, line {line}: {problem}")]
+    Syntax {
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong there.
+        problem: String,
+    },
     /// A number that no vehicle can have.
-    #[error("vehicle `{vehicle}`: `{field}` must be {rule}")]
+    #[error("vehicle `{vehicle}`: `{field}` is {found}; it must be {rule}")]
     Value {
         /// The vehicle in question.
         vehicle: String,
         /// The offending field.
         field: &'static str,
+        /// Its value.
+        found: String,
         /// What its value has to satisfy.
-        rule: &'static str,
+        rule: String,
     },
 }
 
@@ -172,7 +179,10 @@ impl Vehicle {
     /// # Errors
     /// Text which does not parse, a missing or unknown field, or a value outside its range.
     pub fn from_toml(text: &str) -> Result<Self, VehicleError> {
-        let vehicle: Self = toml::from_str(text)?;
+        let vehicle: Self = toml::from_str(text).map_err(|error: toml::de::Error| {
+            let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+            VehicleError::Syntax { line: 1 + before.matches('\n').count(), problem: error.message().into() }
+        })?;
         vehicle.check()?;
         Ok(vehicle)
     }

@@ -47,3 +47,18 @@ pub fn setpoint(sample: &Sample) -> Setpoint {
         yaw: sample.yaw as f32,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_vehicle_of_the_catalogue_has_settings_that_a_vehicle_can_have() {
+        for name in Vehicle::names() {
+            let vehicle = Vehicle::named(name).unwrap();
+            for gains in ["stock", "soft"] {
+                assert_eq!(settings(&vehicle, gains).unwrap().check(), Ok(()), "{name}, {gains}");
+            }
+        }
+    }
+}

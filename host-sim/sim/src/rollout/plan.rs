@@ -87,8 +87,8 @@ pub struct FlightRecord {
 /// Why flights could not be flown.
 #[derive(Debug, thiserror::Error)]
 pub enum RolloutError {
-    /// The rotors cannot produce every moment.
-    #[error("vehicle `{0}`: its rotors cannot produce every moment; check rotor positions and directions")]
+    /// No vehicle has these settings: the vehicle's name, and why.
+    #[error("vehicle {0}")]
     Airframe(String),
     /// The firmware refuses the model.
     #[error("model: {0}")]

@@ -71,7 +71,9 @@ impl<'a> Software<'a> {
         condition: &Condition,
         plan: &FlightPlan<'a>,
     ) -> Result<Self, RolloutError> {
-        let mut flight = Flight::new(settings).ok_or_else(|| RolloutError::Airframe(vehicle.name.clone()))?;
+        settings.check().map_err(|refusal| RolloutError::Airframe(format!("`{}`: {refusal}", vehicle.name)))?;
+        let mut flight = Flight::empty();
+        flight.configure(settings);
         if let Some((model, lanes)) = plan.model {
             flight.attach(model, lanes)?;
             if let Some(adapter) = flight.adapter() {

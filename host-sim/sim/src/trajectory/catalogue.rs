@@ -5,7 +5,7 @@ use super::rows::Rows;
 use super::{Motion, MultisineSettings, SplineSettings, Trajectory, TrajectoryError};
 use super::{circle, figure_eight, growing_tones, helix, letters, lissajous, multisine, random_spline};
 use super::{segments, single_tone, star, stroke, table, trefoil};
-use std::fs::File;
+use impromptu_files::reading;
 use std::io::{BufReader, Read};
 use std::path::Path;
 use std::str::FromStr;
@@ -101,7 +101,7 @@ impl<'a> Words<'a> {
 /// An unreadable or malformed file; the message names line and field.
 pub fn load(path: &Path) -> Result<Motion, TrajectoryError> {
     let file = path.display().to_string();
-    match File::open(path) {
+    match reading::open(path, reading::TABLE) {
         Ok(source) => read(BufReader::new(source), &file),
         Err(source) => Err(TrajectoryError::Unreadable { file, source }),
     }

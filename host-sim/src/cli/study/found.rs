@@ -16,9 +16,10 @@ use crate::cli::{
 /// Writes the page into the folder as `study-NAME.html` and prints what was found.
 pub(super) fn show(invocation: &Invocation, name: &str, study: &Study) -> Result<()> {
     let path = invocation.configuration.folder()?.join(format!("study-{name}.html"));
+    invocation.check_output(&path, [])?;
     write_page(&render_study(study)?, &path)?;
     invocation.console.note(&format!("report: {}", path.display()));
-    invocation.format.print(study, || text(study))
+    invocation.format.print(study, || text(&study.harmless()))
 }
 
 /// Section by section: its tables, then what stands in none.

@@ -136,12 +136,11 @@ impl Draws {
             None => "the model that was built".into(),
         })?;
         let settings = DrawSettings::new(&closed_loop, &model, seed, self.draw.draws, self.draw.draw_strokes as usize, ranges);
-        let name = match self.shard {
-            Shard::WHOLE => format!("draws-{}", slug(&settings.nominal)),
-            Shard { part, of } => format!("draws-{}-{part}-of-{of}", slug(&settings.nominal)),
-        };
-        let path = invocation.configuration.folder()?.join(&name).with_extension("jsonl");
         let header = Header { settings, shard: self.shard };
+        let name = header.name().context("--vehicle, --gains and --condition")?;
+        let path = invocation.configuration.folder()?.join(format!("{name}.jsonl"));
+        let inputs = self.model.as_deref().into_iter().chain(self.draw.ranges.as_deref()).chain(self.situation.files());
+        invocation.check_output(&path, inputs)?;
         let console = &invocation.console;
         let content = fly_draws(&header, &closed_loop, &model, &path, &|done, of| console.steps(done, of))?;
         console.finish();
@@ -167,8 +166,9 @@ impl Merge {
     pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
         let (bytes, content) = merge(&self.files)?;
         let settings = &content.header.settings;
-        let name = format!("draws-{}", slug(&settings.nominal));
-        let path = invocation.configuration.folder()?.join(&name).with_extension("jsonl");
+        let name = content.header.name()?;
+        let path = invocation.configuration.folder()?.join(format!("{name}.jsonl"));
+        invocation.check_output(&path, self.files.iter().map(PathBuf::as_path))?;
         write(&path, &bytes)?;
         invocation.console.note(&format!("{}: {} draws, seed {}", path.display(), content.draws.len(), settings.seed));
         let mut study = Study::new("Monte Carlo over vehicles", &invocation.command, settings.seed);

@@ -6,6 +6,8 @@ Files written into --out:
   NAME.impromptu     the model that `fly`, `evaluate` and the firmware load (int8)
   NAME.safetensors   the float network, NAME.json its description, NAME.rows.csv rows to calibrate on: `model-export export` makes
                      the same model file from them, and other tools can read and write them
+All four are written, or what was there stays. The description names its network and rows by checksum: `model-export` refuses a
+set that a power cut has mixed; the same `train` makes it whole. Too few rows for the network are refused; --force is recorded.
 
 A log is a CSV file with a header; SI units, world frame ENU (x east, y north, z up). Columns, in any order:
   time_s                                        time, increasing, without a gap above 0.1 s

@@ -27,6 +27,7 @@ mod synthetic;
 #[cfg(test)]
 mod tests;
 
+use impromptu_firmware::model::MAX_LAGS;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -92,37 +93,37 @@ impl Default for DesignSettings {
 }
 
 impl DesignSettings {
-    fn check(&self) -> Result<(), DesignRefusal> {
-        let positive = [
-            ("tick", self.tick),
-            ("control_weight", self.control_weight),
-            ("regularisation", self.regularisation),
-            ("least_excitation", self.least_excitation),
+    /// Whether each setting is in its range.
+    ///
+    /// # Errors
+    /// Names the field, its value and the range.
+    pub fn check(&self) -> Result<(), DesignRefusal> {
+        let sensor_noise = self.sensor_noise.unwrap_or_default();
+        let ranges: [(&'static str, &[f64], f64, f64); 12] = [
+            ("tick", &[self.tick], 1e-5, 10.0),
+            ("lags", &[self.lags as f64], 2.0, MAX_LAGS as f64),
+            ("margin_lags", &[self.margin_lags as f64], self.lags as f64, LONGEST_MEMORY),
+            ("control_weight", &[self.control_weight], 1e-12, 1e12),
+            ("velocity_weight", &[self.velocity_weight], 0.0, 1e12),
+            ("integral_weight", &[self.integral_weight], 0.0, 1e12),
+            ("noise_factor", &[self.noise_factor], 0.0, 1e6),
+            ("regularisation", &[self.regularisation], 1e-18, 1.0),
+            ("least_excitation", &[self.least_excitation], 1e-12, 1e6),
+            ("least_precision", &[self.least_precision], 0.0, 1e12),
+            ("least_noise", &self.least_noise, 0.0, 1e6),
+            ("sensor_noise", &sensor_noise, 0.0, 1e6),
         ];
-        let not_negative = [
-            ("velocity_weight", self.velocity_weight),
-            ("integral_weight", self.integral_weight),
-            ("noise_factor", self.noise_factor),
-            ("least_precision", self.least_precision),
-            ("least_noise", self.least_noise[0].min(self.least_noise[1])),
-            ("sensor_noise", self.sensor_noise.map_or(0.0, |[position, velocity]| position.min(velocity))),
-        ];
-        for (field, value) in positive {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(DesignRefusal::setting(field, "positive and finite"));
+        for (field, values, low, high) in ranges {
+            if let Some(value) = values.iter().find(|value| !(low..=high).contains(*value)) {
+                return Err(DesignRefusal::out_of_range(field, *value, low, high));
             }
-        }
-        for (field, value) in not_negative {
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(DesignRefusal::setting(field, "zero or positive, and finite"));
-            }
-        }
-        if self.margin_lags < self.lags {
-            return Err(DesignRefusal::setting("margin_lags", "no fewer than `lags`"));
         }
         Ok(())
     }
 }
+
+/// Longest memory of the model on which a lane is judged, ticks: its matrices have three times as many rows.
+const LONGEST_MEMORY: f64 = 200.0;
 
 /// A feedback lane for one axis and what is known about it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

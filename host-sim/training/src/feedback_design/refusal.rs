@@ -91,17 +91,21 @@ pub enum DesignRefusal {
         sum: f64,
     },
     /// A setting is out of its range.
-    #[error("setting `{field}` must be {requirement}")]
+    #[error("`{field}` {requirement}")]
     Setting {
         /// Name of the setting.
         field: &'static str,
         /// What it must be.
-        requirement: &'static str,
+        requirement: String,
     },
 }
 
 impl DesignRefusal {
     pub(super) fn setting(field: &'static str, requirement: &'static str) -> Self {
-        Self::Setting { field, requirement }
+        Self::Setting { field, requirement: format!("must be {requirement}") }
+    }
+
+    pub(super) fn out_of_range(field: &'static str, value: f64, low: f64, high: f64) -> Self {
+        Self::Setting { field, requirement: format!("is {value}, not from {low} to {high}") }
     }
 }

@@ -1,5 +1,6 @@
 //! Settings of the training with their defaults.
 
+use impromptu_firmware::model::{MAX_LAYERS, MAX_WIDTH};
 use impromptu_model_export::float_network::Activation;
 use serde::{Deserialize, Serialize};
 
@@ -135,6 +136,9 @@ impl Default for FakeQuantisation {
     }
 }
 
+/// Days of training.
+const MOST_EPOCHS: usize = 100_000;
+
 /// Why settings cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("training setting `{field}` is {found}; {expected}")]
@@ -163,28 +167,30 @@ impl TrainingSettings {
         };
         let delta = if let Loss::Huber { delta } = self.loss { delta } else { 1.0 };
         let weights_fit = self.output_weights.is_empty() || self.output_weights.len() == outputs;
-        let weights_usable = self.output_weights.iter().all(|weight| weight.is_finite() && *weight >= 0.0);
+        let weights_usable = self.output_weights.iter().all(|weight| (0.0..=1e6).contains(weight));
         let bits = self.quantisation.and_then(|quantisation| quantisation.activation_bits);
         let text = |value: &dyn std::fmt::Debug| format!("{value:?}");
         let fraction = |value: f64| (0.0..1.0).contains(&value);
-        let rules: [(bool, &'static str, &dyn std::fmt::Debug, &'static str); 14] = [
-            (!self.hidden.contains(&0), "hidden", &self.hidden, "widths are at least 1"),
-            (self.ridge_penalty >= 0.0, "ridge_penalty", &self.ridge_penalty, "use zero or more"),
-            (self.initial_output_gain.is_finite(), "initial_output_gain", &self.initial_output_gain, "use a number"),
-            (delta > 0.0, "loss.huber.delta", &delta, "use more than zero"),
-            (weights_fit && weights_usable, "output_weights", &self.output_weights, "use none, or one per output, none negative"),
-            (self.batch > 0, "batch", &self.batch, "use at least 1"),
+        let hidden = self.hidden.len() < MAX_LAYERS && self.hidden.iter().all(|width| (1..=MAX_WIDTH).contains(width));
+        let rules: [(bool, &'static str, &dyn std::fmt::Debug, &'static str); 15] = [
+            (hidden, "hidden", &self.hidden, "use at most 5 layers of 1 to 256, which is what the firmware holds"),
+            (self.epochs <= MOST_EPOCHS, "epochs", &self.epochs, "use 0 to 100000"),
+            ((0.0..=1e6).contains(&self.ridge_penalty), "ridge_penalty", &self.ridge_penalty, "use 0 to 1e6"),
+            (self.initial_output_gain.abs() <= 1e3, "initial_output_gain", &self.initial_output_gain, "use -1000 to 1000"),
+            (delta > 0.0 && delta <= 1e6, "loss.huber.delta", &delta, "use more than 0, up to 1e6"),
+            (weights_fit && weights_usable, "output_weights", &self.output_weights, "use none, or one per output, 0 to 1e6"),
+            ((1..=1_000_000).contains(&self.batch), "batch", &self.batch, "use 1 to 1000000"),
             (
-                self.learning_rate > 0.0 && self.learning_rate.is_finite(),
+                self.learning_rate > 0.0 && self.learning_rate <= 10.0,
                 "learning_rate",
                 &self.learning_rate,
-                "use more than zero",
+                "use more than 0, up to 10",
             ),
             ((0.0..=1.0).contains(&final_fraction), "schedule", &self.schedule, "fractions are 0 to 1, epochs at least 1"),
             (fraction(self.beta1), "beta1", &self.beta1, "use 0 to below 1"),
             (fraction(self.beta2), "beta2", &self.beta2, "use 0 to below 1"),
-            (self.epsilon > 0.0, "epsilon", &self.epsilon, "use more than zero"),
-            (self.weight_decay >= 0.0, "weight_decay", &self.weight_decay, "use zero or more"),
+            (self.epsilon > 0.0 && self.epsilon <= 1.0, "epsilon", &self.epsilon, "use more than 0, up to 1"),
+            ((0.0..=1e3).contains(&self.weight_decay), "weight_decay", &self.weight_decay, "use 0 to 1000"),
             (self.gradient_clip.is_none_or(|clip| clip > 0.0), "gradient_clip", &self.gradient_clip, "use more than zero"),
             (bits.is_none_or(|bits| (2..=24).contains(&bits)), "quantisation.activation_bits", &bits, "use 2 to 24"),
         ];

@@ -32,7 +32,7 @@ mod app {
     // The vector table of the microcontroller.
     use stm32f4 as _;
 
-    use crate::servo::{RATE_HZ, SIGNALS, Servo, TrackingError, desired};
+    use crate::servo::{CAPS, RATE_HZ, SIGNALS, Servo, TrackingError, desired};
 
     static FILE: &[u8] = include_bytes!("../../../../examples/one_axis.impromptu");
     /// Clock of the core, Hz.
@@ -58,7 +58,7 @@ mod app {
         static SCRATCH: ConstStaticCell<Scratch> = ConstStaticCell::new(Scratch::new());
         let (add_on, scratch) = (ADD_ON.take(), SCRATCH.take());
         let model = Model::load_into(MODEL.take(), FILE, scratch);
-        match model.and_then(|model| add_on.load(model, SIGNALS, RATE_HZ).map(|()| model)) {
+        match model.and_then(|model| add_on.load(model, SIGNALS, RATE_HZ, &CAPS).map(|()| model)) {
             Ok(model) => {
                 if let Some(network) = model.network()
                     && let Ok(task) = inference(network, scratch)

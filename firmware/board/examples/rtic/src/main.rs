@@ -32,7 +32,7 @@ mod app {
     };
     use static_cell::ConstStaticCell;
 
-    use crate::servo::{RATE_HZ, SIGNALS, Servo, TrackingError, desired};
+    use crate::servo::{CAPS, RATE_HZ, SIGNALS, Servo, TrackingError, desired};
 
     static FILE: &[u8] = include_bytes!("../../../../examples/one_axis.impromptu");
     /// Clock of the core, Hz.
@@ -65,7 +65,7 @@ mod app {
         static SCRATCH: ConstStaticCell<Scratch> = ConstStaticCell::new(Scratch::new());
         let (add_on, scratch) = (ADD_ON.take(), SCRATCH.take());
         let model = Model::load_into(MODEL.take(), FILE, scratch);
-        let model = model.and_then(|model| add_on.load(model, SIGNALS, RATE_HZ).map(|()| model));
+        let model = model.and_then(|model| add_on.load(model, SIGNALS, RATE_HZ, &CAPS).map(|()| model));
         let model = match model {
             Ok(model) => Some(model),
             Err(refusal) => {

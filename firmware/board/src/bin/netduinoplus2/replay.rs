@@ -67,7 +67,7 @@ impl fmt::Display for ReplayError {
                 formatter.write_str(": build with IMPROMPTU_MODEL=FILE")
             }
             Self::Recording(tick, error) => write!(formatter, "recording.bin at tick {tick}: {error}"),
-            Self::Airframe => formatter.write_str("recording.bin: the rotors of its settings cannot produce every moment"),
+            Self::Airframe => formatter.write_str("recording.bin: no vehicle has its settings"),
             Self::Ticks(found, told) => {
                 write!(formatter, "recording.bin has {found} ticks and says {told}: it is damaged, record the flight again")
             }

@@ -1,7 +1,9 @@
 //! What reports carry.
 //!
-//! *in/out* the crate's values as plain numbers, SI units, world ENU; *never* a name that makes a frame too long.
+//! *in/out* the crate's values as plain numbers, SI units, world ENU; *never* a name that makes a frame too long, or a number
+//! that the receiver refuses.
 
+use impromptu_firmware::math::finite_or_zero;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -66,7 +68,7 @@ impl Motors {
     /// The answer to a control tick.
     pub fn new(Tick(tick): Tick, command: &MotorCommand, reference: &Reference) -> Self {
         let Reference { position: p, velocity: v, .. } = reference;
-        Self { tick, fractions: command.fractions(), reference: [p.x, p.y, p.z, v.x, v.y, v.z] }
+        Self { tick, fractions: command.fractions(), reference: [p.x, p.y, p.z, v.x, v.y, v.z].map(finite_or_zero) }
     }
 
     /// The motor command.
@@ -95,6 +97,19 @@ pub struct FrameReport {
     pub reordered: u32,
     /// Frames that were missing when a younger one came.
     pub dropped: u32,
+}
+
+/// What became of what the vehicle was told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InputReport {
+    /// Control tick.
+    pub tick: u32,
+    /// States that were refused behind the line since the start: from the future, or such that no vehicle is in.
+    pub refused: u32,
+    /// How many setpoints lie ahead of the one that is flown; negative: the trajectory has ended.
+    pub reach: i32,
+    /// Whether the vehicle brakes, or rests where it has braked.
+    pub braking: bool,
 }
 
 /// How the vehicle is.

@@ -1,0 +1,196 @@
+//! Whether the loop swings, and the feedback lane does nothing against it.
+//!
+//! *in* at every monitor tick, of each axis: the error, what of it the lane leads to, and what the loop's nominal response to the
+//! desired trajectory leads to; *out* the share of the lane that may act, and whether it leaves the loop astray; *never* a
+//! judgement on what is slow: a payload or a steady wind leads to an error that the lane is there for; *source* ours: settings
+//! and times were measured in flights with 0 to 90 ms more delay than the model knows.
+//!
+//! A lane that damps takes away most of the swinging part of the error. In a loop with more delay than the model knows, what it
+//! asks for comes too late, and the swinging part is nearly as large as without the lane, or larger: that shows while it is no
+//! larger than the error of a good flight. The lane's share shrinks first, which alone may calm the loop; then it is handed over.
+
+use super::{GuardSettings, watch::ewma_gain};
+use crate::{
+    format::MAX_AXES,
+    math::{clamp, finite_or_zero},
+};
+
+/// Recent share of the network lane from which on, and at which, it is relied on.
+const RELIED: [f32; 2] = [0.7, 0.9];
+
+/// Numbers of one axis, or energies of all: of the error, of the error without the feedback lane, of what the loop makes of that
+/// lane's part of the correction, and of the error that the nominal response to the desired trajectory alone leads to.
+pub(super) type Parts = [f32; 4];
+
+/// Place of the last one.
+const NOMINAL: usize = 3;
+
+/// Recent swinging parts.
+#[derive(Clone, Debug)]
+pub(super) struct Swing {
+    /// Recent means of each axis: what is slower than a swing.
+    means: [Parts; MAX_AXES],
+    /// Recent mean squares of what is left, all axes added.
+    energies: Parts,
+    /// Recent share of the network lane.
+    reliance: f32,
+    /// Share of the feedback lane that may act.
+    share: f32,
+    /// What swings is more than it may be,
+    swinging: bool,
+    /// and the feedback lane does nothing against it, or is its cause.
+    astray: bool,
+}
+
+impl Swing {
+    /// Nothing seen yet: all zeros.
+    pub(super) const NONE: Self =
+        Self { means: [[0.0; 4]; MAX_AXES], energies: [0.0; 4], reliance: 0.0, share: 0.0, swinging: false, astray: false };
+
+    /// Share of the feedback lane that may act, 0..=1.
+    pub(super) fn share(&self) -> f32 {
+        self.share
+    }
+
+    /// Whether what swings is more than it may be after what is desired, whoever is to blame.
+    pub(super) fn swinging(&self) -> bool {
+        self.swinging
+    }
+
+    /// Whether the feedback lane leaves the loop astray.
+    pub(super) fn astray(&self) -> bool {
+        self.astray
+    }
+
+    /// A reference tick of this length, s, in which the network lane has this share, 0..=1.
+    pub(super) fn rely(&mut self, network: f32, settings: &GuardSettings, seconds: f32) {
+        self.reliance += (network - self.reliance) * ewma_gain(seconds / settings.relied_s);
+        // Where less of it acts now, nothing is known of what it leaves.
+        if network < self.reliance {
+            self.reliance = network;
+        }
+    }
+
+    /// A monitor tick of this length, s.
+    #[inline(never)]
+    pub(super) fn observe(&mut self, axes: &[Parts; MAX_AXES], validated_rms: f32, settings: &GuardSettings, seconds: f32) {
+        let slow = ewma_gain(seconds / settings.swing_s);
+        let recent = ewma_gain(seconds / settings.astray_s);
+        for (part, energy) in self.energies.iter_mut().enumerate() {
+            let mut now = 0.0;
+            for (mean, parts) in self.means.iter_mut().zip(axes) {
+                if let (Some(mean), Some(value)) = (mean.get_mut(part), parts.get(part)) {
+                    *mean = finite_or_zero(*mean + (value - *mean) * slow);
+                    now += (value - *mean) * (value - *mean);
+                }
+            }
+            // Slower down than up: the loop may be later than nominal.
+            let gain = if part == NOMINAL && now < *energy { 0.5 * recent } else { recent };
+            *energy = finite_or_zero(*energy + (now - *energy) * gain);
+        }
+        self.judge(validated_rms, settings, seconds);
+    }
+
+    fn judge(&mut self, validated_rms: f32, settings: &GuardSettings, seconds: f32) {
+        let square = |value: f32| value * value;
+        let [with, without, response, nominal] = self.energies;
+        let relied = clamp((self.reliance - RELIED[0]) / (RELIED[1] - RELIED[0]), 0.0, 1.0);
+        let factor = settings.astray_factor + (settings.astray_share - settings.astray_factor) * relied;
+        let allowed = square(factor) * nominal + square(settings.astray_floor * validated_rms);
+        // A lane that has hardly any part in what swings does not drive it.
+        let caused = response > square(settings.astray_cause) * with;
+        let excess = if caused { with - square(settings.astray_left) * without } else { 0.0 };
+        (self.swinging, self.astray) = (with > allowed, excess > allowed);
+        let onset = square(settings.swing_onset);
+        let most = clamp((allowed - excess) / ((1.0 - onset) * allowed), 0.0, 1.0);
+        let grown = clamp(self.share + seconds / settings.swing_recovery_s, settings.swing_start, 1.0);
+        self.share = if grown < most { grown } else { most };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const RMS: f32 = 0.006;
+    const TICK: f32 = 0.05;
+
+    /// After ten seconds of these parts of one axis.
+    fn after(parts: impl Fn(f32) -> Parts, network: f32) -> Swing {
+        let (mut swing, settings) = (Swing::NONE, GuardSettings::default());
+        for tick in 0..200 {
+            swing.rely(network, &settings, TICK);
+            let mut axes = [[0.0; 4]; MAX_AXES];
+            axes[0] = parts(tick as f32 * TICK);
+            swing.observe(&axes, RMS, &settings, TICK);
+        }
+        swing
+    }
+
+    /// An error that swings 1.7 times a second, of which the lane would leave this share.
+    fn swings(amplitude: f32, left: f32) -> impl Fn(f32) -> Parts {
+        move |t| {
+            let with = amplitude * libm::sinf(10.7 * t);
+            [with, with / left, with - with / left, 0.0]
+        }
+    }
+
+    #[test]
+    fn a_lane_that_leaves_as_much_as_there_was_is_handed_over() {
+        // Its response is as large as what it should take away, but comes too late.
+        let late = |amplitude| {
+            after(
+                move |t| {
+                    let with = amplitude * libm::sinf(10.7 * t);
+                    [with, 1.1 * with, amplitude * libm::cosf(10.7 * t), 0.0]
+                },
+                1.0,
+            )
+        };
+        assert!(late(0.04).astray() && late(0.04).share() == 0.0);
+        let small = late(0.001);
+        assert!(!small.astray() && small.share() == 1.0, "{small:?}");
+        let between = late(0.016);
+        assert!(!between.astray() && between.share() > 0.0 && between.share() < 1.0, "{between:?}");
+    }
+
+    #[test]
+    fn a_lane_that_damps_may_act_however_much_swings() {
+        for amplitude in [0.001, 0.02, 0.2] {
+            let swing = after(swings(amplitude, 0.5), 1.0);
+            assert!(!swing.astray() && swing.share() == 1.0, "{amplitude}: {swing:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_slow_is_no_swing() {
+        let payload = |t: f32| [0.1 * t.min(1.0), 0.1 * t.min(1.0), 0.05, 0.0];
+        let swing = after(payload, 1.0);
+        assert!(!swing.astray() && !swing.swinging() && swing.share() == 1.0, "{swing:?}");
+    }
+
+    #[test]
+    fn what_the_desired_trajectory_leads_to_is_allowed_and_less_of_it_where_the_network_acts() {
+        let follows = |t: f32| {
+            let with = 0.05 * libm::sinf(10.7 * t);
+            [with, with, with, 1.5 * with]
+        };
+        assert!(!after(follows, 0.0).astray());
+        assert!(after(follows, 1.0).astray());
+    }
+
+    proptest! {
+        #[test]
+        fn it_is_a_share_whatever_comes_in(
+            values in prop::collection::vec(any::<[f32; 4]>(), 1..20), rms in any::<f32>(), network in any::<f32>()
+        ) {
+            let (mut swing, settings) = (Swing::NONE, GuardSettings::default());
+            for [with, without, response, nominal] in values {
+                swing.rely(network, &settings, TICK);
+                swing.observe(&[[with, without, response, nominal]; MAX_AXES], rms, &settings, TICK);
+                prop_assert!((0.0..=1.0).contains(&swing.share()), "{}", swing.share());
+            }
+        }
+    }
+}
