@@ -46,7 +46,6 @@ static const impromptu_cap caps[6] = {POSITION, POSITION, POSITION, VELOCITY, VE
 /* What the library must refuse, whatever it is given. */
 static int refusals(uint32_t length)
 {
-    static impromptu_adapter untouched;
     float numbers[17] = {0};
     int due;
     impromptu_job job;
@@ -111,8 +110,8 @@ static int refusals(uint32_t length)
     DO(impromptu_adapter_report(&adapter, &report));
     EXPECT(report.next_tick == 0 && report.late == 0 && report.saturations == 0);
     /* An object of another kind is none. */
-    memcpy(&untouched, &model, sizeof(uint64_t));
-    EXPECT(impromptu_adapter_report(&untouched, &report) == IMPROMPTU_STATUS_NOT_CREATED);
+    memcpy(&split_adapter, &model, sizeof(uint64_t));
+    EXPECT(impromptu_adapter_report(&split_adapter, &report) == IMPROMPTU_STATUS_NOT_CREATED);
     EXPECT(strcmp(impromptu_status_text(-1), "no status of this library") == 0);
     return 0;
 }

@@ -3,8 +3,8 @@
 //!
 //! Every draw has a number; the same number is the same flight. Both fly it with the same vehicle, air, noise and faults. Over
 //! any four seconds the RMS error with the add-on may be 1.1 times the baseline's, 1.5 times where delay was added, and 1 cm
-//! more. The baseline's is that over the same four seconds or over those that begin a preview later, whichever is larger: a preview
-//! moves before a step. Where the baseline itself is lost, nothing is asked.
+//! more. The baseline's is that over the same four seconds or over those that begin a preview later, whichever is larger: a
+//! preview moves before a step. Where the baseline itself is lost, nothing is asked.
 
 mod draw;
 mod flown;

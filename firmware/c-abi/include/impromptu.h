@@ -59,12 +59,12 @@
 
 #if defined(IMPROMPTU_POINTER_64)
 // Words of 8 bytes of an impromptu_flight.
-#define IMPROMPTU_FLIGHT_WORDS 2112
+#define IMPROMPTU_FLIGHT_WORDS 2064
 #endif
 
 #if defined(IMPROMPTU_POINTER_32)
 // Words of 8 bytes of an impromptu_flight.
-#define IMPROMPTU_FLIGHT_WORDS 2112
+#define IMPROMPTU_FLIGHT_WORDS 2064
 #endif
 
 // Words of 8 bytes of an impromptu_scratch.

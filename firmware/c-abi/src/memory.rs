@@ -21,10 +21,10 @@ pub const ADAPTER_WORDS: usize = 2752;
 pub const ADAPTER_WORDS: usize = 2720;
 /// Words of 8 bytes of an impromptu_flight.
 #[cfg(target_pointer_width = "64")]
-pub const FLIGHT_WORDS: usize = 2112;
+pub const FLIGHT_WORDS: usize = 2064;
 /// Words of 8 bytes of an impromptu_flight.
 #[cfg(target_pointer_width = "32")]
-pub const FLIGHT_WORDS: usize = 2112;
+pub const FLIGHT_WORDS: usize = 2064;
 /// Words of 8 bytes of an impromptu_scratch.
 pub const SCRATCH_WORDS: usize = 257;
 

@@ -354,13 +354,21 @@ fn adapted(
     job: &mut Job,
     path: impl FnOnce(&mut [f32; MAX_AXES]),
 ) -> (Reference, bool) {
+    tell_standing(add_on, frozen, tick, state);
     let measured = quadrotor::measured(state);
     let (adapter, preview) = add_on.parts();
-    adapter.set_standing(frozen.ticks(state, &preview.sample(tick), adapter.rate_hz()));
     let released = adapter.begin_into(tick, preview, &measured, job);
     let reference = adapter.finish_through(tick, preview, &measured, path);
     let yaw = preview.channel(tick, DESIRED - 1);
     (quadrotor::reference(&reference, yaw), released)
+}
+
+/// Tells the adapter for how long the measured position has stood still. What else a tick does needs none of its stack.
+#[inline(never)]
+fn tell_standing(add_on: &mut QuadrotorAddOn<'_>, frozen: &mut Frozen, tick: i32, state: &State) {
+    let (adapter, preview) = add_on.parts();
+    let [vx, vy, vz] = [3, 4, 5].map(|channel| preview.channel(tick, channel));
+    adapter.set_standing(frozen.ticks(state, &Vector3::new(vx, vy, vz), adapter.rate_hz()));
 }
 
 /// The reference without an add-on at a reference tick. The adapter would give the same bits, but for the state's angles first.

@@ -69,23 +69,25 @@ impl Jumps {
         divisor: i32,
     ) -> bool {
         let seen = self.seen.filter(|seen| seen.wrapping_sub(first) >= 0 && last.wrapping_sub(*seen) >= 0);
-        let mut tick = seen.unwrap_or(first);
-        let mut before = preview.sample(tick);
-        for _ in 0..divisor.saturating_add(CATCH_UP) {
-            if tick == last {
-                break;
-            }
-            tick = tick.wrapping_add(1);
-            let sample = preview.sample(tick);
-            for (channel, ((now, before), pace)) in sample.iter().zip(&before).zip(paces).enumerate() {
+        let from = seen.unwrap_or(first);
+        let ticks = last.wrapping_sub(from).min(divisor.saturating_add(CATCH_UP)).max(0);
+        // Channel by channel, as two whole samples would be the control task's deepest stack.
+        let mut jump = 0;
+        for (channel, pace) in paces.iter().enumerate().filter(|(channel, _)| self.channels >> (channel & 31) & 1 == 1) {
+            let mut before = preview.channel(from, channel);
+            for step in 1..=ticks {
+                let now = preview.channel(from.wrapping_add(step), channel);
                 let moved = abs(now - before) * pace * divisor as f32;
-                if self.channels >> (channel & 31) & 1 == 1 && (moved > JUMP || moved.is_nan()) {
-                    self.newest = Some(tick);
+                if moved > JUMP || moved.is_nan() {
+                    jump = jump.max(step);
                 }
+                before = now;
             }
-            before = sample;
         }
-        self.seen = Some(tick);
+        if jump > 0 {
+            self.newest = Some(from.wrapping_add(jump));
+        }
+        self.seen = Some(from.wrapping_add(ticks));
         self.newest.is_some_and(|newest| newest.wrapping_sub(first) >= 0 && last.wrapping_sub(newest) >= 0)
     }
 }

@@ -214,7 +214,8 @@ impl Counterfactual {
         }
     }
 
-    /// Ends a monitor tick.
+    /// Ends a monitor tick. What else a tick does needs none of its stack.
+    #[inline(never)]
     fn close(&mut self, monitor: &Monitor<'_>, settings: &GuardSettings, rate_hz: f32) {
         let ticks = f32::from(monitor.divisor());
         let mean = 1.0 / ticks;

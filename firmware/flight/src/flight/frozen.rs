@@ -10,7 +10,7 @@
 
 use nalgebra::Vector3;
 
-use crate::{quadrotor::DESIRED, types::State};
+use crate::types::State;
 
 /// A position that comes ten times a second stands still for 0.1 s.
 const SHORTEST: f32 = 0.25;
@@ -72,12 +72,10 @@ impl Frozen {
     /// Nothing seen yet: all zeros.
     pub(super) const EMPTY: Self = Self { axes: [Axis::NONE; 3], velocity: Vector3::new(0.0, 0.0, 0.0), seconds: 0.0 };
 
-    /// A reference tick at a rate, Hz, with the state as it is measured and what is desired. Returns for how many ticks the
-    /// position has stood still, if it must have changed since; else 0.
-    #[inline(never)]
-    pub(super) fn ticks(&mut self, state: &State, desired: &[f32; DESIRED], rate_hz: f32) -> u16 {
-        let [_, _, _, vx, vy, vz, ..] = *desired;
-        (self.observe(&state.position, &state.velocity, &Vector3::new(vx, vy, vz), 1.0 / rate_hz) * rate_hz) as u16
+    /// A reference tick at a rate, Hz, with the state as it is measured and the desired velocity, m/s. Returns for how many ticks
+    /// the position has stood still, if it must have changed since; else 0.
+    pub(super) fn ticks(&mut self, state: &State, desired: &Vector3<f32>, rate_hz: f32) -> u16 {
+        (self.observe(&state.position, &state.velocity, desired, 1.0 / rate_hz) * rate_hz) as u16
     }
 
     /// A reference tick of `dt` seconds with the measured position and velocity and the desired velocity. Returns how long the
