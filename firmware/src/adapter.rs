@@ -91,6 +91,15 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
     /// how old the newest measurement is, and for how long it has stood still although it must have changed, reference ticks.
     age: u16,
     standing: u16,
+    /// The loop does not move the machine yet.
+    grounded: bool,
+    /// Measured channels of which a new measurement is never as the last, by the application's word, a bit for each,
+    noisy: u32,
+    /// for how many reference ticks one may stand in, and for how many they have been the same.
+    repeats: u16,
+    same: u16,
+    /// What stands for their values in the last tick.
+    print: u32,
 }
 
 impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
@@ -127,6 +136,11 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
             features: Features::Unchanged,
             age: 0,
             standing: 0,
+            grounded: false,
+            noisy: 0,
+            repeats: 0,
+            same: 0,
+            print: 0,
         }
     }
 
@@ -229,7 +243,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.forget_lanes();
         self.features = Features::Unchanged;
         self.jumps.clear();
-        (self.age, self.standing) = (0, 0);
+        (self.age, self.standing, self.same) = (0, 0, 0);
         self.guard.reset();
     }
 
@@ -283,6 +297,40 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     /// knows; 0 from the start. It counts as an age.
     pub fn set_standing(&mut self, ticks: u16) {
         self.standing = ticks;
+    }
+
+    /// States that these measured channels have noise in them, so that all of them together are never twice the same but where no
+    /// new measurement came, for at most `ticks` reference ticks in a row. Once they have been the same for longer, they have
+    /// stood still for as long: that counts as an age. Channels behind the last are none; without channels, as from the start,
+    /// nothing is stated.
+    pub fn expect_noise(&mut self, channels: impl IntoIterator<Item = usize>, ticks: u16) {
+        self.noisy = channels.into_iter().fold(0, |all, channel| all | u32::from(channel < M.min(32)) << (channel & 31));
+        (self.repeats, self.same) = (ticks, 0);
+    }
+
+    /// States whether the loop moves the machine: a vehicle on the ground, or a machine that is held, does not follow. Until it
+    /// does, no lane acts, nothing is integrated, learned or judged; then the lanes fade in. It does from the start on.
+    pub fn set_airborne(&mut self, airborne: bool) {
+        self.grounded = !airborne;
+    }
+
+    /// Lanes that are wanted of a loop that moves its machine.
+    fn wanted(&self) -> Lanes {
+        if self.grounded { Lanes::NONE } else { self.lanes }
+    }
+
+    /// For how many reference ticks the channels with noise have been the same, if for longer than they may be; else 0.
+    fn repeated(&mut self, measured: &[f32; M]) -> u16 {
+        if self.noisy == 0 {
+            return 0;
+        }
+        let stated = measured.iter().enumerate().filter(|(channel, _)| self.noisy >> (channel & 31) & 1 == 1);
+        // A number that stands for all of them: two in a row are the same by chance once in four billion ticks.
+        let print =
+            stated.fold(0u32, |sum, (_, value)| sum.wrapping_add(value.to_bits()).wrapping_mul(0x9e37_79b1).rotate_left(13));
+        self.same = if print == self.print { self.same.saturating_add(1) } else { 0 };
+        self.print = print;
+        if self.same > self.repeats { self.same } else { 0 }
     }
 
     /// Reference ticks in a second of the model that is flown; 0 without one.

@@ -315,6 +315,22 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
         self.adapter.set_age(ticks);
     }
 
+    /// Tells for how many reference ticks what is measured has stood still although it must have changed, as the application
+    /// knows; 0 from the start. It counts as an age.
+    pub fn set_standing(&mut self, ticks: u16) {
+        self.adapter.set_standing(ticks);
+    }
+
+    /// States that these measured channels have noise in them ([`Adapter::expect_noise`]).
+    pub fn expect_noise(&mut self, channels: impl IntoIterator<Item = usize>, ticks: u16) {
+        self.adapter.expect_noise(channels, ticks);
+    }
+
+    /// States whether the loop moves the machine ([`Adapter::set_airborne`]).
+    pub fn set_airborne(&mut self, airborne: bool) {
+        self.adapter.set_airborne(airborne);
+    }
+
     /// Adapter and trajectory, for whoever does more with them than a whole add-on does.
     pub fn parts(&mut self) -> (&mut Adapter<'m, D, M, R>, &mut Preview<D, N>) {
         (&mut self.adapter, &mut self.preview)

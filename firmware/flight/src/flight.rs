@@ -82,6 +82,8 @@ pub struct Flight<'m> {
     /// The newest state that a vehicle can be in.
     state: Option<State>,
     frozen: Frozen,
+    /// It stands on the ground, by the application's word.
+    grounded: bool,
 }
 
 impl<'m> Flight<'m> {
@@ -100,6 +102,7 @@ impl<'m> Flight<'m> {
             clock: Clock::EMPTY,
             state: None,
             frozen: Frozen::EMPTY,
+            grounded: false,
         }
     }
 
@@ -233,6 +236,13 @@ impl<'m> Flight<'m> {
         Vector3::new(x, y, z)
     }
 
+    /// States whether the vehicle is in the air, which a loop that is closed on the ground cannot know: until it is, no lane acts,
+    /// and nothing is integrated or learned, in the position loop too. It is from the start on.
+    pub fn set_airborne(&mut self, airborne: bool) {
+        self.grounded = !airborne;
+        self.add_on.parts().0.set_airborne(airborne);
+    }
+
     /// Adds an offset, m, world ENU, to the position reference from the next reference tick on: the independent dither without
     /// which the closed loop cannot be identified. Zero leaves every bit as it is. One that is further than any vehicle flies
     /// changes nothing.
@@ -321,6 +331,9 @@ impl<'m> Flight<'m> {
         self.reference = reference;
         if self.dither != Vector3::zeros() {
             self.reference.position += self.dither;
+        }
+        if self.grounded {
+            loops.position.clear_integral();
         }
         (Some(loops.position.step(&self.reference, state)), released)
     }

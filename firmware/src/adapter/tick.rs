@@ -53,7 +53,7 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
         let Some(measured) = self.sane(measured) else { return false };
         self.catch_up(tick, preview);
         self.measured.push(measured);
-        if !(self.lanes.network || self.network_weight > 0.0) || model.network().is_none() {
+        if !(self.wanted().network || self.network_weight > 0.0) || model.network().is_none() {
             self.ramp.clear();
             self.features = Features::Unknown;
             return false;
@@ -152,6 +152,7 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
         let desired = preview.sample(tick);
         let mut reference = self.desired_reference(preview, &desired, measured);
         let stand_in;
+        let repeated = self.repeated(measured);
         let known = if all_finite(measured) {
             (self.good, self.bad) = (Some(*measured), 0);
             Some(measured)
@@ -172,25 +173,25 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
             self.ramp.publish();
         }
         let network = self.ramp.value(interpolation, self.clock.phase(), divisor);
-        let wanted_at_all = self.lanes != Lanes::NONE;
-        self.starved = self.starved.saturating_add(u32::from(wanted_at_all && preview.reach(tick) < self.ahead));
+        let lanes = self.wanted();
+        self.starved = self.starved.saturating_add(u32::from(lanes != Lanes::NONE && preview.reach(tick) < self.ahead));
         let Verdict { allowed, handover_step, share } = self.guard.tick(&Observation {
             lane: card.feedback.as_ref(),
             monitor: model.monitor(),
-            wanted: self.lanes,
+            wanted: lanes,
             last: self.acted.then_some(&self.outcome),
             features: core::mem::replace(&mut self.features, Features::Unchanged),
             finite: all_finite(&desired),
             bad: self.bad,
             late: self.ramp.late_in_a_row(),
-            age: self.age.max(self.standing),
+            age: self.age.max(self.standing).max(repeated),
             trajectory: !preview.is_empty(),
         });
         // The network lane has a value from its first sub-rate tick on: a fade that began before would end in a step.
         let present = Lanes { network: self.ramp.current() && model.network().is_some(), feedback: model.feedback().is_some() };
         let fade = Fade::new(card.timing.fade_ticks, handover_step);
-        self.network_weight = fade.next(self.network_weight, self.lanes.network, allowed.network, present.network);
-        self.feedback_weight = fade.next(self.feedback_weight, self.lanes.feedback, allowed.feedback, present.feedback);
+        self.network_weight = fade.next(self.network_weight, lanes.network, allowed.network, present.network);
+        self.feedback_weight = fade.next(self.feedback_weight, lanes.feedback, allowed.feedback, present.feedback);
         let errors = feedback::errors(model, tick, preview, measured);
         let active = allowed.feedback && self.feedback_weight > 0.0;
         let wanted = Wanted {
@@ -209,7 +210,7 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
         // What the guard learns of it begins one reference tick after a sub-rate tick: where it sums up as often as the network
         // is evaluated, no tick pays for both.
         let turn = self.acted || self.clock.phase() == 1 % divisor;
-        self.acted = turn && (acting || self.lanes != Lanes::NONE);
+        self.acted = turn && (acting || lanes != Lanes::NONE);
         if self.acted {
             (self.outcome.active, self.outcome.asked) = (active, wanted.feedback);
             self.outcome.network = self.network_weight * self.ramp.share();

@@ -39,6 +39,10 @@ enum Call {
     Rearm,
     Guard(bool),
     Age(u16),
+    Standing(u16),
+    /// These measured channels have noise, and may stand for so many ticks.
+    Noise(u8, u16),
+    Airborne(bool),
     /// An inference that nobody asked for.
     Deliver(i32, u32),
     /// Ticks as they should be.
@@ -59,6 +63,9 @@ fn call() -> impl Strategy<Value = Call> {
         Just(Call::Rearm),
         any::<bool>().prop_map(Call::Guard),
         any::<u16>().prop_map(Call::Age),
+        any::<u16>().prop_map(Call::Standing),
+        (any::<u8>(), 0u16..20).prop_map(|(channels, ticks)| Call::Noise(channels, ticks)),
+        any::<bool>().prop_map(Call::Airborne),
         (-3i32..3, any::<u32>()).prop_map(|(ahead, bits)| Call::Deliver(ahead, bits)),
         (1u8..60).prop_map(Call::Ticks),
     ]
@@ -127,6 +134,9 @@ proptest! {
                 Call::Rearm => add_on.rearm(),
                 Call::Guard(on) => add_on.set_guard(if on { GuardSettings::default() } else { GuardSettings::OFF }),
                 Call::Age(age) => add_on.set_age(age),
+                Call::Standing(ticks) => add_on.set_standing(ticks),
+                Call::Noise(channels, ticks) => add_on.expect_noise((0..8).filter(|bit| channels >> bit & 1 == 1), ticks),
+                Call::Airborne(airborne) => add_on.set_airborne(airborne),
                 Call::Deliver(ahead, bits) => add_on.deliver(Inference {
                     tick: tick.wrapping_add(ahead),
                     outputs: [f32::from_bits(bits); MAX_OUTPUTS],

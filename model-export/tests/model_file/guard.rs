@@ -52,6 +52,18 @@ fn fly(
     ticks: i32,
     doing: impl Fn(i32) -> Doing,
 ) -> Vec<Tick> {
+    fly_told(description, correction, settings, ticks, doing, |_, _| ())
+}
+
+/// [`fly`] in which the application tells the adapter something before each tick.
+fn fly_told(
+    description: Description,
+    correction: [f32; 2],
+    settings: GuardSettings,
+    ticks: i32,
+    doing: impl Fn(i32) -> Doing,
+    tell: impl Fn(&mut Adapter<'_, 2, 2, 2>, i32),
+) -> Vec<Tick> {
     let bytes = constant_model(description.clone(), correction);
     let model = Model::from_bytes(&bytes).unwrap();
     let mut adapter: Adapter<'_, 2, 2, 2> = Adapter::new(&model, &table(&description), 100.0, &CAPS, CAPACITY).unwrap();
@@ -64,6 +76,7 @@ fn fly(
             let Doing { desired, measured, lanes, age } = doing(tick);
             adapter.switch(lanes);
             adapter.set_age(age);
+            tell(&mut adapter, tick);
             let reference = adapter.step(tick, &preview, &measured, &mut Scratch::new());
             let correction = [adapter.correction()[0], adapter.correction()[1]];
             Tick { desired, reference, correction, trips: adapter.trips(), acting: adapter.guard().unwrap().allowed(lanes) }
@@ -123,6 +136,68 @@ fn measurements_that_are_no_numbers_for_long_take_both_lanes_off_once_and_back_a
     assert_eq!((flight[308].acting, flight[309].acting), (Lanes::NONE, Lanes::BOTH));
     assert_eq!(flight[499].trips, only(Trip::NotFinite, [1, 1]));
     assert_eq!(flight[499].correction[0], 0.1);
+}
+
+/// The measurement of a tick, in which noise never repeats, but new only each `period` ticks, and never again from `end` on.
+fn sampled(tick: i32, period: i32, end: i32) -> f32 {
+    let last = tick.min(end) / period * period;
+    1.0 + 1e-3 * (last as f32 * 0.7).sin()
+}
+
+#[test]
+fn what_has_noise_and_stands_still_is_old_if_the_application_says_so() {
+    let flight = |period: i32, channels: &[usize]| {
+        let doing = |tick: i32| Doing { measured: [sampled(tick, period, 200), 0.0], ..calm(Lanes::BOTH) };
+        let description = Description { monitor: None, ..guarded() };
+        let tell = |adapter: &mut Adapter<'_, 2, 2, 2>, tick: i32| {
+            if tick == 0 {
+                adapter.expect_noise(channels.iter().copied(), period as u16);
+            }
+        };
+        fly_told(description, [0.1, 0.0], GuardSettings::default(), 300, doing, tell)
+    };
+    for period in [1, 10] {
+        let stated = flight(period, &[0]);
+        assert_eq!(stated[200].trips, Trips::default(), "new each {period} ticks");
+        let found = stated.iter().position(|tick| tick.acting == Lanes::NONE);
+        assert!(found.is_some_and(|tick| (201..=230).contains(&tick)), "{found:?}");
+        assert_eq!(stated[299].trips, only(Trip::Stale, [1, 1]));
+        // Where nothing is stated, or only of a channel that there is not, what stands still may be at rest.
+        for channels in [&[][..], &[7]] {
+            assert_eq!(flight(period, channels)[299].trips, Trips::default());
+        }
+    }
+    // A channel that does not move does not hide behind one that does.
+    let doing = |tick: i32| Doing { measured: [sampled(tick, 1, 200), tick as f32], ..calm(Lanes::BOTH) };
+    let tell = |adapter: &mut Adapter<'_, 2, 2, 2>, tick: i32| {
+        if tick == 0 {
+            adapter.expect_noise([0], 1);
+        }
+    };
+    let flight = fly_told(Description { monitor: None, ..guarded() }, [0.1, 0.0], GuardSettings::default(), 300, doing, tell);
+    assert_eq!(flight[299].trips, only(Trip::Stale, [1, 1]));
+}
+
+#[test]
+fn on_the_ground_no_lane_acts_integrates_learns_or_trips_and_in_the_air_they_fade_in() {
+    // A vehicle that does not follow, a lane that integrates, and a measurement that is too old meanwhile.
+    let mut description = guarded();
+    description.feedback_lane = Some(lane([vec![-0.5], vec![0.0]], vec![0.0], 0.5));
+    let doing = |tick: i32| {
+        let ground = tick < 400;
+        Doing { measured: [if ground { 0.8 } else { 1.0 }, 0.0], age: if ground { 50 } else { 0 }, ..calm(Lanes::BOTH) }
+    };
+    let tell = |adapter: &mut Adapter<'_, 2, 2, 2>, tick: i32| adapter.set_airborne(tick >= 400);
+    let flight = fly_told(description.clone(), [0.1, 0.0], GuardSettings::default(), 500, doing, tell);
+    for tick in &flight[..400] {
+        assert_eq!((bits(tick.reference), tick.trips), (bits(tick.desired), Trips::default()));
+    }
+    // From there on as a flight that begins there, but for the errors of the last ticks on the ground, which the lane remembers.
+    let fresh = fly(description, [0.1, 0.0], GuardSettings::default(), 100, |_| calm(Lanes::BOTH));
+    for (tick, fresh) in flight[410..].iter().zip(&fresh[10..]) {
+        assert!((tick.correction[0] - fresh.correction[0]).abs() < 2e-3, "{:?} {:?}", tick.correction, fresh.correction);
+        assert_eq!(tick.trips, Trips::default());
+    }
 }
 
 #[test]

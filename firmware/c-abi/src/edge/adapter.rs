@@ -147,6 +147,35 @@ pub unsafe extern "C" fn impromptu_adapter_set_age(adapter: *mut AdapterMemory, 
     })
 }
 
+/// States that measured channels have noise in them, bit `c` of `channels` for channel `c`, so that all of them together are never
+/// twice the same but where no new measurement came, for at most `ticks` reference ticks in a row. Once they have been the same
+/// for longer, they are as old as that: both lanes are handed over from 0.1 s on. No bit, as from the start: nothing is stated.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_adapter_expect_noise(adapter: *mut AdapterMemory, channels: u32, ticks: u32) -> Status {
+    report(|| {
+        // SAFETY: the module's rules.
+        let adapter = unsafe { object::<Stage>(adapter)? };
+        let own = adapter.model().ok_or(Status::Nothing)?.card().signals.measured.len();
+        if u64::from(channels) >> own != 0 {
+            return Err(Status::Count);
+        }
+        let stated = (0..own).filter(|channel| channels >> channel & 1 == 1);
+        adapter.expect_noise(stated, u16::try_from(ticks).unwrap_or(u16::MAX));
+        Ok(())
+    })
+}
+
+/// States whether the loop moves the machine (not 0): a vehicle on the ground, or a machine that is held, does not follow. Until
+/// it does, no lane acts, nothing is integrated, learned or judged; then the lanes fade in. It does from the start on.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_adapter_set_airborne(adapter: *mut AdapterMemory, airborne: c_int) -> Status {
+    report(|| {
+        // SAFETY: the module's rules.
+        unsafe { object::<Stage>(adapter)?.set_airborne(airborne != 0) };
+        Ok(())
+    })
+}
+
 /// Switches the network lane and the feedback lane on (not 0) or off; they fade in and out over the model's fade time. With both
 /// off and faded out the reference is the desired one, to the bit.
 #[unsafe(no_mangle)]

@@ -79,6 +79,11 @@ impl PositionLoop {
         (self.integral, self.yaw, self.heading, self.attitude) = (Vector3::zeros(), 0.0, Vector3::x(), Matrix3::identity());
     }
 
+    /// Empties the integral.
+    pub fn clear_integral(&mut self) {
+        self.integral = Vector3::zeros();
+    }
+
     /// Nonlinear transformation: the acceleration that PD (and integral) ask for, plus gravity, as a thrust vector.
     pub fn step(&mut self, reference: &Reference, state: &State) -> ThrustVector {
         let position_error = (reference.position - state.position).map(bounded);
