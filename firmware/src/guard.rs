@@ -186,7 +186,7 @@ impl Guard {
         let swings = self.oscillation.present(settings);
         // A lane that shook the loop comes back when the loop is calm. Until then what swings says nothing about the network.
         let swing = self.counterfactual.swing();
-        let shaken = swing.swinging() && self.feedback.tripped_by(Trip::Astray);
+        let shaken = !swing.settled() && self.feedback.tripped_by(Trip::Astray);
         let astray = swing.astray() || shaken;
         let network_harms = network_harms && !shaken;
         let first = |causes: [(bool, Trip); 8]| causes.into_iter().find(|(present, _)| *present).map(|(_, trip)| trip);

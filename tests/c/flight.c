@@ -109,10 +109,55 @@ static int refusals(uint32_t length)
     EXPECT(impromptu_adapter_push(&adapter, numbers, 10) == IMPROMPTU_STATUS_NOT_FINITE);
     DO(impromptu_adapter_report(&adapter, &report));
     EXPECT(report.next_tick == 0 && report.late == 0 && report.saturations == 0);
+    /* A measured channel that there is not. */
+    EXPECT(impromptu_adapter_expect_noise(&adapter, 1u << 13, 1) == IMPROMPTU_STATUS_COUNT);
+    DO(impromptu_adapter_expect_noise(&adapter, 7, 1));
+    DO(impromptu_adapter_set_airborne(&adapter, 0));
     /* An object of another kind is none. */
     memcpy(&split_adapter, &model, sizeof(uint64_t));
     EXPECT(impromptu_adapter_report(&split_adapter, &report) == IMPROMPTU_STATUS_NOT_CREATED);
     EXPECT(strcmp(impromptu_status_text(-1), "no status of this library") == 0);
+    return 0;
+}
+
+/* A trajectory along x at 1 m/s: re-planned by 2 m, then braked, it moves by no more than its limits say. */
+static int other_courses(const impromptu_flight_settings *settings)
+{
+    impromptu_state state = {{0}, {0}, {1.0f, 0.0f, 0.0f, 0.0f}, {0}, 0.0f};
+    impromptu_setpoint setpoint = {{0}, {0}, {0}, 0.0f};
+    impromptu_command command;
+    float last = 0.0f;
+    uint32_t tick;
+
+    DO(impromptu_flight_create(&flight, sizeof flight, settings));
+    DO(impromptu_flight_set_airborne(&flight, 0));
+    DO(impromptu_flight_set_airborne(&flight, 1));
+    DO(impromptu_scratch_create(&scratch, sizeof scratch));
+    EXPECT(impromptu_flight_rearm(&flight) == IMPROMPTU_STATUS_NOTHING);
+    setpoint.velocity[0] = 1.0f;
+    for (tick = 0; tick < 400; tick++) {
+        if (tick < 200)
+            DO(impromptu_flight_push(&flight, &setpoint));
+        setpoint.position[0] += 0.01f;
+        if (tick == 100) {
+            EXPECT(impromptu_flight_replan(&flight, 99, &setpoint) == IMPROMPTU_STATUS_TICK);
+            setpoint.position[0] += 2.0f;
+            DO(impromptu_flight_replan(&flight, 101, &setpoint));
+            setpoint.position[0] += 0.01f;
+        }
+        if (tick == 200) {
+            DO(impromptu_flight_brake(&flight));
+            EXPECT(impromptu_flight_push(&flight, &setpoint) == IMPROMPTU_STATUS_BRAKING);
+        }
+        DO(impromptu_flight_step(&flight, &scratch, tick * settings->position_divisor, &state, &command));
+        /* No more than the trajectory's 1 m/s and the blend's 5 m/s together. */
+        EXPECT(command.reference.position[0] - last < 0.061f && last - command.reference.position[0] < 1e-4f);
+        if (tick == 150)
+            EXPECT(command.reference.position[0] > last + 0.01f);
+        if (tick == 399)
+            EXPECT(command.reference.position[0] == last && command.reference.velocity[0] == 0.0f);
+        last = command.reference.position[0];
+    }
     return 0;
 }
 
@@ -216,6 +261,7 @@ static int run(void)
     settings.control_hz = -settings.control_hz;
     EXPECT(impromptu_flight_create(&flight, sizeof flight, &settings) == IMPROMPTU_STATUS_SETTINGS);
     settings.control_hz = -settings.control_hz;
+    EXPECT(other_courses(&settings) == 0);
     DO(impromptu_flight_create(&flight, sizeof flight, &settings));
     DO(impromptu_flight_create(&split_flight, sizeof split_flight, &settings));
     EXPECT(impromptu_flight_switch(&flight, 1, 1) == IMPROMPTU_STATUS_NOTHING);

@@ -59,12 +59,12 @@
 
 #if defined(IMPROMPTU_POINTER_64)
 // Words of 8 bytes of an impromptu_flight.
-#define IMPROMPTU_FLIGHT_WORDS 2064
+#define IMPROMPTU_FLIGHT_WORDS 2080
 #endif
 
 #if defined(IMPROMPTU_POINTER_32)
 // Words of 8 bytes of an impromptu_flight.
-#define IMPROMPTU_FLIGHT_WORDS 2064
+#define IMPROMPTU_FLIGHT_WORDS 2080
 #endif
 
 // Words of 8 bytes of an impromptu_scratch.
@@ -146,6 +146,10 @@ enum impromptu_status
   IMPROMPTU_STATUS_NO_TRAJECTORY = 31,
   // The preview is full: as many samples as it keeps lie ahead of the last reference tick.
   IMPROMPTU_STATUS_FULL = 32,
+  // The vehicle brakes, or rests where it has braked: only impromptu_flight_replan goes on.
+  IMPROMPTU_STATUS_BRAKING = 33,
+  // The reference tick has been flown, or lies further ahead than the preview keeps.
+  IMPROMPTU_STATUS_TICK = 34,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -433,6 +437,15 @@ impromptu_status impromptu_adapter_rearm(struct impromptu_adapter *adapter);
 // Both lanes are handed over while it is older than 0.1 s.
 impromptu_status impromptu_adapter_set_age(struct impromptu_adapter *adapter, uint32_t ticks);
 
+// States that measured channels have noise in them, bit `c` of `channels` for channel `c`, so that all of them together are never
+// twice the same but where no new measurement came, for at most `ticks` reference ticks in a row. Once they have been the same
+// for longer, they are as old as that: both lanes are handed over from 0.1 s on. No bit, as from the start: nothing is stated.
+impromptu_status impromptu_adapter_expect_noise(struct impromptu_adapter *adapter, uint32_t channels, uint32_t ticks);
+
+// States whether the loop moves the machine (not 0): a vehicle on the ground, or a machine that is held, does not follow. Until
+// it does, no lane acts, nothing is integrated, learned or judged; then the lanes fade in. It does from the start on.
+impromptu_status impromptu_adapter_set_airborne(struct impromptu_adapter *adapter, int airborne);
+
 // Switches the network lane and the feedback lane on (not 0) or off; they fade in and out over the model's fade time. With both
 // off and faded out the reference is the desired one, to the bit.
 impromptu_status impromptu_adapter_switch(struct impromptu_adapter *adapter, int network, int feedback);
@@ -497,8 +510,26 @@ impromptu_status impromptu_flight_attach(struct impromptu_flight *flight,
 
 // Appends the desired state of the next reference tick, as far ahead as impromptu_description.future says. One that is not
 // finite, or that no vehicle can be asked for, gives IMPROMPTU_STATUS_NOT_FINITE and is not stored: the next one is still that
-// of the same tick.
+// of the same tick. After impromptu_flight_brake it gives IMPROMPTU_STATUS_BRAKING.
 impromptu_status impromptu_flight_push(struct impromptu_flight *flight, const struct impromptu_setpoint *setpoint);
+
+// Replaces what is stored from reference tick `tick` on, which must not have been flown: `setpoint` is the new trajectory's
+// first, and further ones are pushed. What it differs by from the old one fades within 5 m/s and 3 m/s^2, so that nothing
+// jumps. It ends a brake.
+impromptu_status impromptu_flight_replan(struct impromptu_flight *flight,
+                                         int32_t tick,
+                                         const struct impromptu_setpoint *setpoint);
+
+// Replaces what is stored after the present by coming to rest within 3 m/s^2 and 8 m/s^3, and resting there until
+// impromptu_flight_replan.
+impromptu_status impromptu_flight_brake(struct impromptu_flight *flight);
+
+// Lets lanes act again that the guard has handed over for good. What is still wrong hands them over again.
+impromptu_status impromptu_flight_rearm(struct impromptu_flight *flight);
+
+// States whether the vehicle is in the air (not 0), which a loop that is closed on the ground cannot know: until it is, no lane
+// acts, and nothing is integrated or learned. It is from the start on.
+impromptu_status impromptu_flight_set_airborne(struct impromptu_flight *flight, int airborne);
 
 // Switches the network lane and the feedback lane on (not 0) or off.
 impromptu_status impromptu_flight_switch(struct impromptu_flight *flight, int network, int feedback);

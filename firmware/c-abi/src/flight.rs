@@ -10,6 +10,7 @@ use impromptu_firmware::{
     network::Scratch,
 };
 use impromptu_flight::{
+    course::{self, Course, Now},
     flight::Flight,
     types::{self, MotorCommand, Tick},
 };
@@ -23,6 +24,11 @@ use crate::{
 #[derive(Debug)]
 pub struct Stack {
     pub(crate) flight: Flight<'static>,
+    pub(crate) course: Course,
+    /// Seconds from one reference tick to the next.
+    pub(crate) period: f32,
+    /// The last reference tick that was flown.
+    pub(crate) flown: Option<i32>,
 }
 
 impl Stack {
@@ -37,10 +43,47 @@ impl Stack {
     /// Appends the desired state of the next reference tick.
     ///
     /// # Errors
-    /// If a number is not finite, or no vehicle can be asked for it; then nothing is stored.
+    /// If a number is not finite, or no vehicle can be asked for it, or the vehicle brakes; then nothing is stored.
     pub fn push(&mut self, setpoint: &Setpoint) -> Result<(), Status> {
-        let setpoint = setpoint.checked().ok_or(Status::NotFinite)?;
-        self.flight.push_setpoint(&setpoint).then_some(()).ok_or(Status::NotFinite)
+        let (setpoint, now) = (physical(setpoint)?, self.now());
+        Ok(self.course.append(&mut self.flight, &now, &setpoint)?)
+    }
+
+    /// Replaces what is stored from a reference tick on; the difference fades.
+    ///
+    /// # Errors
+    /// If a number is not finite, or no vehicle can be asked for it, or the tick has been flown; then nothing changes.
+    pub fn replan(&mut self, tick: i32, setpoint: &Setpoint) -> Result<(), Status> {
+        let (setpoint, now) = (physical(setpoint)?, self.now());
+        Ok(self.course.replan(&mut self.flight, &now, tick, &setpoint)?)
+    }
+
+    /// Replaces what is stored after the present by coming to rest.
+    pub fn brake(&mut self) {
+        let now = self.now();
+        self.course.brake(&mut self.flight, &now);
+    }
+
+    fn now(&self) -> Now {
+        Now { tick: self.flown.map_or(0, |flown| flown.wrapping_add(1)), flown: self.flown, period: self.period }
+    }
+
+    /// What the trajectory needs before a control tick, and which state it is.
+    fn begin(&mut self, tick: u32, state: &State) -> Result<types::State, Status> {
+        let state = state.checked().filter(types::State::is_physical).ok_or(Status::NotFinite)?;
+        self.flown = Some(self.flight.reference_tick(Tick(tick)));
+        let now = self.now();
+        self.course.keep_up(&mut self.flight, &now);
+        Ok(state)
+    }
+
+    /// Lets lanes act again that the guard has handed over for good.
+    ///
+    /// # Errors
+    /// If there is no model.
+    pub fn rearm(&mut self) -> Result<(), Status> {
+        self.flight.adapter().ok_or(Status::Nothing)?.rearm();
+        Ok(())
     }
 
     /// Switches lanes.
@@ -57,7 +100,7 @@ impl Stack {
     /// # Errors
     /// If the state is not finite, or no vehicle can be in it; then nothing is done.
     pub fn step(&mut self, tick: u32, state: &State, scratch: &mut Scratch) -> Result<Command, Status> {
-        let state = state.checked().filter(types::State::is_physical).ok_or(Status::NotFinite)?;
+        let state = self.begin(tick, state)?;
         let command = self.flight.step(Tick(tick), &state, scratch);
         Ok(self.command(&command))
     }
@@ -67,7 +110,7 @@ impl Stack {
     /// # Errors
     /// If the state is not finite, or no vehicle can be in it; then nothing is done.
     pub fn control(&mut self, tick: u32, state: &State) -> Result<(Command, Option<Job>), Status> {
-        let state = state.checked().filter(types::State::is_physical).ok_or(Status::NotFinite)?;
+        let state = self.begin(tick, state)?;
         let (command, job) = self.flight.control(Tick(tick), &state);
         Ok((self.command(&command), job))
     }
@@ -88,5 +131,19 @@ impl Stack {
 
     fn command(&self, command: &MotorCommand) -> Command {
         Command { motors: command.fractions(), reference: self.flight.reference().into() }
+    }
+}
+
+/// A setpoint that a vehicle can be asked for.
+fn physical(setpoint: &Setpoint) -> Result<types::Setpoint, Status> {
+    setpoint.checked().filter(types::Setpoint::is_physical).ok_or(Status::NotFinite)
+}
+
+impl From<course::Refusal> for Status {
+    fn from(refusal: course::Refusal) -> Self {
+        match refusal {
+            course::Refusal::Braking => Self::Braking,
+            course::Refusal::Tick { .. } => Self::Tick,
+        }
     }
 }

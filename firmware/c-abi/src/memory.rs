@@ -18,13 +18,13 @@ pub const MODEL_WORDS: usize = 512;
 pub const ADAPTER_WORDS: usize = 2752;
 /// Words of 8 bytes of an impromptu_adapter.
 #[cfg(target_pointer_width = "32")]
-pub const ADAPTER_WORDS: usize = 2720;
+pub const ADAPTER_WORDS: usize = 2736;
 /// Words of 8 bytes of an impromptu_flight.
 #[cfg(target_pointer_width = "64")]
-pub const FLIGHT_WORDS: usize = 2064;
+pub const FLIGHT_WORDS: usize = 2096;
 /// Words of 8 bytes of an impromptu_flight.
 #[cfg(target_pointer_width = "32")]
-pub const FLIGHT_WORDS: usize = 2064;
+pub const FLIGHT_WORDS: usize = 2096;
 /// Words of 8 bytes of an impromptu_scratch.
 pub const SCRATCH_WORDS: usize = 257;
 

@@ -66,11 +66,15 @@ pub enum Status {
     NoTrajectory = 31,
     /// The preview is full: as many samples as it keeps lie ahead of the last reference tick.
     Full = 32,
+    /// The vehicle brakes, or rests where it has braked: only impromptu_flight_replan goes on.
+    Braking = 33,
+    /// The reference tick has been flown, or lies further ahead than the preview keeps.
+    Tick = 34,
 }
 
 impl Status {
     /// Every status.
-    pub(crate) const ALL: [Self; 27] = [
+    pub(crate) const ALL: [Self; 29] = [
         Self::Ok,
         Self::Null,
         Self::Misaligned,
@@ -98,6 +102,8 @@ impl Status {
         Self::BadSample,
         Self::NoTrajectory,
         Self::Full,
+        Self::Braking,
+        Self::Tick,
     ];
 
     /// The status in words, with what to do.
@@ -130,6 +136,8 @@ impl Status {
             Self::BadSample => c"a measured number is NaN or infinite: the last good sample stood in",
             Self::NoTrajectory => c"there is no desired trajectory: push one; until then the loop holds",
             Self::Full => c"the preview is full: push no further ahead",
+            Self::Braking => c"the vehicle brakes: only a re-plan goes on",
+            Self::Tick => c"the reference tick has been flown, or lies too far ahead",
         }
     }
 }

@@ -12,12 +12,11 @@
 //! | a state from the future, or one that no vehicle is in | ignored and counted: one missed sample |
 //! | states of a sender that starts again in flight | heard 20 ms (attitude) and 0.1 s (position) after the last old one |
 //! | settings that no vehicle has, or of another control rate | refused by name; nothing changes |
-//! | a setpoint after a gap, a re-plan, a brake | no jump, see the table in `autopilot/course.rs` |
+//! | a setpoint after a gap, a re-plan, a brake | no jump, see the table of [`crate::course`] |
 //! | a setpoint that is stored already | ignored |
 //! | a setpoint that was flown without, or of a sender that starts again | refused, with the tick that is expected |
 //! | no setpoint any more | the end of the trajectory is held |
 
-mod course;
 mod meters;
 mod state_age;
 
@@ -30,6 +29,7 @@ use impromptu_firmware::{
 use nalgebra::{Quaternion, UnitQuaternion, Vector4};
 
 use crate::{
+    course::{self, Course, Now},
     flight::Flight,
     link::{
         Command, Message, Order, Outcome, Reason, Received,
@@ -40,8 +40,6 @@ use crate::{
     types::{MotorCommand, Reference, State, Tick},
 };
 
-pub use course::RESUMES;
-use course::{Course, Now};
 pub use meters::Meters;
 use state_age::{News, StateAge};
 pub use state_age::{RUN, Timeouts};
@@ -74,6 +72,15 @@ pub struct Autopilot<'m> {
     /// Mean square of the tracking error over about the last second, m².
     error_square: f32,
     refused: u32,
+}
+
+impl From<course::Refusal> for Reason {
+    fn from(refusal: course::Refusal) -> Self {
+        match refusal {
+            course::Refusal::Braking => Self::Braking,
+            course::Refusal::Tick { expected } => Self::Setpoint { expected },
+        }
+    }
 }
 
 impl Default for Autopilot<'_> {
@@ -204,9 +211,9 @@ impl<'m> Autopilot<'m> {
             }
             (Command::Setpoint(setpoint), _) => {
                 let now = self.now();
-                match self.course.follow(&mut self.flight, &now, setpoint) {
+                match self.course.follow(&mut self.flight, &now, setpoint.tick, &setpoint.setpoint()) {
                     Ok(()) => return Reaction::Silence,
-                    Err(reason) => Err(reason),
+                    Err(refusal) => Err(refusal.into()),
                 }
             }
             // An order that was overtaken by a younger one is out of date.
@@ -215,7 +222,7 @@ impl<'m> Autopilot<'m> {
             (Command::Lanes(lanes), _) => self.switch(*lanes),
             (Command::Replan(setpoint), _) => {
                 let now = self.now();
-                self.course.replan(&mut self.flight, &now, setpoint)
+                self.course.replan(&mut self.flight, &now, setpoint.tick, &setpoint.setpoint()).map_err(Reason::from)
             }
             (Command::Brake, _) => self.brake(),
             (Command::Arm, _) => self.arm(),

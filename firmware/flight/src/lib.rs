@@ -14,7 +14,8 @@
 //! # Layers
 //!
 //! Values that cross the boundary are at the bottom. The baseline loop, its settings and its signals know nothing of a link; the
-//! flight stack puts the add-on before them, and the link carries its values. The autopilot arms and disarms the flight stack as
+//! flight stack puts the add-on before them, and the link carries its values. The course
+//! says what trajectory is flown. The autopilot arms and disarms the flight stack as
 //! the link says, the application gives both a serial line. A recording holds every call of the flight stack. What is above may
 //! use what is below, never the other way round:
 //!
@@ -28,9 +29,10 @@
 //! | 3 | `settings` | vehicle constants, gains and rates |
 //! | 4 | `flight` | the baseline loop with the add-on before it |
 //! | 4 | `link` | messages as bytes which may be lost, damaged or delayed |
-//! | 5 | `autopilot` | arming, and what happens when nothing arrives any more |
+//! | 5 | `course` | the trajectory: gaps, re-plans, braking |
 //! | 5 | `replay` | recorded flights, and how they are flown again |
-//! | 6 | `application` | the autopilot behind its serial line |
+//! | 6 | `autopilot` | arming, and what happens when nothing arrives any more |
+//! | 7 | `application` | the autopilot behind its serial line |
 //!
 //! `reset`, `restart` and `clear` mean what they mean in [`impromptu_firmware`].
 #![cfg_attr(not(test), no_std)]
@@ -41,6 +43,7 @@ pub mod application;
 pub mod autopilot;
 pub mod caps;
 pub mod control;
+pub mod course;
 pub mod flight;
 pub mod link;
 pub mod motion;

@@ -14,7 +14,7 @@
 use super::{
     GuardSettings, Monitor,
     observation::Outcome,
-    swing::{Parts, Swing},
+    swing::{LATER, Parts, Swing},
     watch::ewma_gain,
 };
 use crate::{
@@ -117,6 +117,8 @@ pub struct Counterfactual {
     references: [[Past; MAX_INPUTS]; MAX_AXES],
     /// and of the axis itself at the time of the measurement.
     desired: [f32; MAX_AXES],
+    /// What the loop made of the feedback lane's part in the last monitor ticks, newest first.
+    before: [[f32; LATER]; MAX_AXES],
     energies: Energies,
     harmful: [bool; 2],
     /// What swings.
@@ -134,6 +136,7 @@ impl Counterfactual {
         contributions: [[Contributions::EMPTY; MAX_INPUTS]; MAX_AXES],
         references: [[Past::EMPTY; MAX_INPUTS]; MAX_AXES],
         desired: [0.0; MAX_AXES],
+        before: [[0.0; LATER]; MAX_AXES],
         energies: Energies { with: 0.0, without_feedback: 0.0, network_only: 0.0, baseline: 0.0, long_term_baseline: 0.0 },
         harmful: [false; 2],
         swing: Swing::NONE,
@@ -169,13 +172,13 @@ impl Counterfactual {
         }
         (self.phase, self.head, self.errors, self.desired) = (0, 0, [0.0; MAX_AXES], [0.0; MAX_AXES]);
         (self.energies, self.harmful, self.busy) = (Energies::default(), [false; 2], false);
-        self.swing = Swing::NONE;
+        (self.swing, self.before) = (Swing::NONE, [[0.0; LATER]; MAX_AXES]);
     }
 
     /// Adds a reference tick with the errors of the monitor's axes.
     pub(super) fn observe(&mut self, monitor: &Monitor<'_>, seen: &Outcome, settings: &GuardSettings, rate_hz: f32) {
         let shares = &seen.shares;
-        self.swing.rely(seen.network, settings, 1.0 / rate_hz);
+        self.swing.rely(seen.network, seen.active, settings, 1.0 / rate_hz);
         let believed = |value: f32| clamp(finite_or_zero(value), -LARGEST, LARGEST);
         if !self.busy {
             // As if what is desired now had been desired for long.
@@ -221,11 +224,11 @@ impl Counterfactual {
         let mean = 1.0 / ticks;
         self.head = if self.head == 0 { monitor.taps().saturating_sub(1) } else { self.head - 1 };
         let mut now = Energies::default();
-        let mut parts: [Parts; MAX_AXES] = [[0.0; 4]; MAX_AXES];
+        let mut parts: [Parts; MAX_AXES] = [[0.0; 5]; MAX_AXES];
         let [mut acts, mut assisted] = [false; 2];
-        let desired = self.references.iter_mut().zip(&mut self.desired);
+        let desired = self.references.iter_mut().zip(&mut self.desired).zip(&mut self.before);
         let axes = monitor.axes().iter().zip(&mut self.contributions).zip(&mut self.errors).zip(&mut parts);
-        for (((((axis, response), contributions), error), parts), (references, desired)) in axes.zip(desired) {
+        for (((((axis, response), contributions), error), parts), ((references, desired), before)) in axes.zip(desired) {
             let with = *error * mean;
             *error = 0.0;
             // Relative to what is desired now: a response that ends too early is no error that grows with the position.
@@ -256,7 +259,9 @@ impl Counterfactual {
             now.without_feedback += unaided * unaided;
             now.network_only += (unaided + more) * (unaided + more);
             now.baseline += (unaided - network) * (unaided - network);
-            *parts = [with, unaided, feedback, nominal];
+            *parts = [with, unaided, feedback, nominal, with - before[LATER - 1]];
+            before.rotate_right(1);
+            before[0] = feedback;
         }
         let weight = |seconds: f32| ewma_gain(ticks / (seconds * rate_hz));
         let recent = weight(settings.counterfactual_s);

@@ -75,23 +75,26 @@ pub struct GuardSettings {
     pub oscillation_trips: u16,
     /// What is slower than this time constant, s, does not swing: a payload, a steady wind, the integral.
     pub swing_s: f32,
-    /// The feedback lane acts in full until what swings comes to this share of what makes it trip astray; from there on it acts
+    /// The feedback lane acts in full until what swings comes to this share of where nothing of it acts; from there on it acts
     /// less.
     pub swing_onset: f32,
     /// It begins with this share, as the loop's delay is not known yet,
     pub swing_start: f32,
     /// and its share may grow by one in this time, s.
     pub swing_recovery_s: f32,
-    /// The feedback lane trips when what swings of the error is more than this share of what would swing without the lane, beyond
-    /// what the desired trajectory and the floor allow. A lane that damps leaves a half and less.
+    /// Nothing of the feedback lane acts where what swings of the error is more than this share of what would swing without the
+    /// lane, beyond what the desired trajectory and the floor allow. A lane that damps leaves a half and less.
     pub astray_left: f32,
+    /// It trips when that is this factor more than allowed.
+    pub astray_trip: f32,
     /// What the loop's nominal response to the desired trajectory leads to allows this factor of it in addition,
     pub astray_factor: f32,
     /// or this share where the network lane has acted in full for long.
     pub astray_share: f32,
     /// What swings may be this many times the model's validated RMS in addition.
     pub astray_floor: f32,
-    /// A feedback lane whose part of the response swings by less than this share of the error does not lead it astray.
+    /// A feedback lane whose part of the response swings by less than this share of the error does not trip astray: it does not
+    /// drive it.
     pub astray_cause: f32,
     /// The energies of what swings are exponentially weighted means with this time constant, s.
     pub astray_s: f32,
@@ -136,6 +139,7 @@ impl GuardSettings {
         swing_start: 0.0,
         swing_recovery_s: 0.0,
         astray_left: 0.0,
+        astray_trip: 0.0,
         astray_factor: 0.0,
         astray_share: 0.0,
         astray_floor: 0.0,
@@ -175,6 +179,7 @@ impl GuardSettings {
         swing_start: 0.3,
         swing_recovery_s: 2.0,
         astray_left: 0.7,
+        astray_trip: 1.7,
         astray_factor: 1.0,
         astray_share: 0.3,
         astray_floor: 0.6,

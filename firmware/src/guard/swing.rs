@@ -7,7 +7,11 @@
 //!
 //! A lane that damps takes away most of the swinging part of the error. In a loop with more delay than the model knows, what it
 //! asks for comes too late, and the swinging part is nearly as large as without the lane, or larger: that shows while it is no
-//! larger than the error of a good flight. The lane's share shrinks first, which alone may calm the loop; then it is handed over.
+//! larger than the error of a good flight. What there would be without the lane rests on the loop's response, which is then late
+//! too: so it is taken from two loops, the nominal one and one that is [`LATER`] monitor ticks later, whichever leaves less.
+//!
+//! The lane's share shrinks first, which alone may calm the loop, whoever drives it; a lane that does is handed over, until the
+//! loop has settled.
 
 use super::{GuardSettings, watch::ewma_gain};
 use crate::{
@@ -18,11 +22,15 @@ use crate::{
 /// Recent share of the network lane from which on, and at which, it is relied on.
 const RELIED: [f32; 2] = [0.7, 0.9];
 
-/// Numbers of one axis, or energies of all: of the error, of the error without the feedback lane, of what the loop makes of that
-/// lane's part of the correction, and of the error that the nominal response to the desired trajectory alone leads to.
-pub(super) type Parts = [f32; 4];
+/// Monitor ticks by which the response may be later than the model knows.
+pub(super) const LATER: usize = 2;
 
-/// Place of the last one.
+/// Numbers of one axis, or energies of all: of the error, of the error without the feedback lane, of what the loop makes of that
+/// lane's part of the correction, of the error that the nominal response to the desired trajectory alone leads to, and of the
+/// error without the feedback lane in a loop that is [`LATER`].
+pub(super) type Parts = [f32; 5];
+
+/// Place of the last one but one.
 const NOMINAL: usize = 3;
 
 /// Recent swinging parts.
@@ -40,12 +48,24 @@ pub(super) struct Swing {
     swinging: bool,
     /// and the feedback lane does nothing against it, or is its cause.
     astray: bool,
+    /// It is no more than it may be where the network acts in full.
+    settled: bool,
+    /// The feedback lane acts.
+    active: bool,
 }
 
 impl Swing {
     /// Nothing seen yet: all zeros.
-    pub(super) const NONE: Self =
-        Self { means: [[0.0; 4]; MAX_AXES], energies: [0.0; 4], reliance: 0.0, share: 0.0, swinging: false, astray: false };
+    pub(super) const NONE: Self = Self {
+        means: [[0.0; 5]; MAX_AXES],
+        energies: [0.0; 5],
+        reliance: 0.0,
+        share: 0.0,
+        swinging: false,
+        astray: false,
+        settled: false,
+        active: false,
+    };
 
     /// Share of the feedback lane that may act, 0..=1.
     pub(super) fn share(&self) -> f32 {
@@ -57,13 +77,19 @@ impl Swing {
         self.swinging
     }
 
+    /// Whether what swings is no more than it may be where the network acts in full.
+    pub(super) fn settled(&self) -> bool {
+        self.settled
+    }
+
     /// Whether the feedback lane leaves the loop astray.
     pub(super) fn astray(&self) -> bool {
         self.astray
     }
 
-    /// A reference tick of this length, s, in which the network lane has this share, 0..=1.
-    pub(super) fn rely(&mut self, network: f32, settings: &GuardSettings, seconds: f32) {
+    /// A reference tick of this length, s, in which the network lane has this share, 0..=1, and the feedback lane acts or not.
+    pub(super) fn rely(&mut self, network: f32, active: bool, settings: &GuardSettings, seconds: f32) {
+        self.active = active;
         self.reliance += (network - self.reliance) * ewma_gain(seconds / settings.relied_s);
         // Where less of it acts now, nothing is known of what it leaves.
         if network < self.reliance {
@@ -93,17 +119,23 @@ impl Swing {
 
     fn judge(&mut self, validated_rms: f32, settings: &GuardSettings, seconds: f32) {
         let square = |value: f32| value * value;
-        let [with, without, response, nominal] = self.energies;
+        let [with, nominally, response, nominal, later] = self.energies;
+        let without = if later < nominally { later } else { nominally };
         let relied = clamp((self.reliance - RELIED[0]) / (RELIED[1] - RELIED[0]), 0.0, 1.0);
         let factor = settings.astray_factor + (settings.astray_share - settings.astray_factor) * relied;
-        let allowed = square(factor) * nominal + square(settings.astray_floor * validated_rms);
+        let floor = square(settings.astray_floor * validated_rms);
+        let allowed = square(factor) * nominal + floor;
+        let excess = with - square(settings.astray_left) * without;
         // A lane that has hardly any part in what swings does not drive it.
         let caused = response > square(settings.astray_cause) * with;
-        let excess = if caused { with - square(settings.astray_left) * without } else { 0.0 };
-        (self.swinging, self.astray) = (with > allowed, excess > allowed);
+        self.swinging = with > allowed;
+        self.settled = with <= square(settings.astray_share) * nominal + floor;
+        self.astray = caused && excess > square(settings.astray_trip) * allowed;
         let onset = square(settings.swing_onset);
         let most = clamp((allowed - excess) / ((1.0 - onset) * allowed), 0.0, 1.0);
-        let grown = clamp(self.share + seconds / settings.swing_recovery_s, settings.swing_start, 1.0);
+        // A lane that comes back begins anew.
+        let grown = if self.active { self.share + seconds / settings.swing_recovery_s } else { 0.0 };
+        let grown = clamp(grown, settings.swing_start, 1.0);
         self.share = if grown < most { grown } else { most };
     }
 }
@@ -120,8 +152,8 @@ mod tests {
     fn after(parts: impl Fn(f32) -> Parts, network: f32) -> Swing {
         let (mut swing, settings) = (Swing::NONE, GuardSettings::default());
         for tick in 0..200 {
-            swing.rely(network, &settings, TICK);
-            let mut axes = [[0.0; 4]; MAX_AXES];
+            swing.rely(network, true, &settings, TICK);
+            let mut axes = [[0.0; 5]; MAX_AXES];
             axes[0] = parts(tick as f32 * TICK);
             swing.observe(&axes, RMS, &settings, TICK);
         }
@@ -132,7 +164,7 @@ mod tests {
     fn swings(amplitude: f32, left: f32) -> impl Fn(f32) -> Parts {
         move |t| {
             let with = amplitude * libm::sinf(10.7 * t);
-            [with, with / left, with - with / left, 0.0]
+            [with, with / left, with - with / left, 0.0, with / left]
         }
     }
 
@@ -143,7 +175,7 @@ mod tests {
             after(
                 move |t| {
                     let with = amplitude * libm::sinf(10.7 * t);
-                    [with, 1.1 * with, amplitude * libm::cosf(10.7 * t), 0.0]
+                    [with, 1.1 * with, amplitude * libm::cosf(10.7 * t), 0.0, 1.1 * with]
                 },
                 1.0,
             )
@@ -165,7 +197,7 @@ mod tests {
 
     #[test]
     fn what_is_slow_is_no_swing() {
-        let payload = |t: f32| [0.1 * t.min(1.0), 0.1 * t.min(1.0), 0.05, 0.0];
+        let payload = |t: f32| [0.1 * t.min(1.0), 0.1 * t.min(1.0), 0.05, 0.0, 0.1 * t.min(1.0)];
         let swing = after(payload, 1.0);
         assert!(!swing.astray() && !swing.swinging() && swing.share() == 1.0, "{swing:?}");
     }
@@ -174,21 +206,49 @@ mod tests {
     fn what_the_desired_trajectory_leads_to_is_allowed_and_less_of_it_where_the_network_acts() {
         let follows = |t: f32| {
             let with = 0.05 * libm::sinf(10.7 * t);
-            [with, with, with, 1.5 * with]
+            [with, with, with, 1.5 * with, with]
         };
-        assert!(!after(follows, 0.0).astray());
-        assert!(after(follows, 1.0).astray());
+        assert!(after(follows, 0.0).share() == 1.0 && !after(follows, 0.0).astray());
+        assert!(after(follows, 1.0).share() == 0.0);
+    }
+
+    #[test]
+    fn a_lane_that_damps_only_if_the_loop_is_not_late_does_not_damp() {
+        let believed = |t: f32| {
+            let with = 0.04 * libm::sinf(10.7 * t);
+            [with, 2.0 * with, with, 0.0, 0.5 * with]
+        };
+        assert!(after(believed, 1.0).astray() && after(believed, 1.0).share() == 0.0);
+    }
+
+    #[test]
+    fn in_a_loop_that_swings_by_itself_nothing_of_the_lane_acts_and_it_trips_not() {
+        let by_itself = |t: f32| {
+            let with = 0.04 * libm::sinf(10.7 * t);
+            [with, with, 0.1 * with, 0.0, with]
+        };
+        let swing = after(by_itself, 1.0);
+        assert!(swing.share() == 0.0 && !swing.astray() && !swing.settled(), "{swing:?}");
+    }
+
+    #[test]
+    fn a_lane_that_comes_back_begins_with_less() {
+        let (mut swing, settings) = (after(|_| [0.0; 5], 1.0), GuardSettings::default());
+        assert_eq!(swing.share(), 1.0);
+        swing.rely(1.0, false, &settings, TICK);
+        swing.observe(&[[0.0; 5]; MAX_AXES], RMS, &settings, TICK);
+        assert_eq!(swing.share(), settings.swing_start);
     }
 
     proptest! {
         #[test]
         fn it_is_a_share_whatever_comes_in(
-            values in prop::collection::vec(any::<[f32; 4]>(), 1..20), rms in any::<f32>(), network in any::<f32>()
+            values in prop::collection::vec(any::<Parts>(), 1..20), rms in any::<f32>(), network in any::<f32>()
         ) {
             let (mut swing, settings) = (Swing::NONE, GuardSettings::default());
-            for [with, without, response, nominal] in values {
-                swing.rely(network, &settings, TICK);
-                swing.observe(&[[with, without, response, nominal]; MAX_AXES], rms, &settings, TICK);
+            for parts in values {
+                swing.rely(network, true, &settings, TICK);
+                swing.observe(&[parts; MAX_AXES], rms, &settings, TICK);
                 prop_assert!((0.0..=1.0).contains(&swing.share()), "{}", swing.share());
             }
         }

@@ -3,7 +3,7 @@
 use core::ffi::c_int;
 
 use impromptu_firmware::{adapter::Lanes, model::Model, network::Scratch};
-use impromptu_flight::flight::Flight;
+use impromptu_flight::{course::Course, flight::Flight};
 
 use super::{Place, create, input, object, report, view};
 use crate::{
@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// All zeros, so that it is written in place.
-const EMPTY: Flight<'static> = Flight::empty();
+const EMPTY: Stack = Stack { flight: Flight::empty(), course: Course::NONE, period: 0.0, flown: None };
 
 /// Creates a flight stack in `flight`, which has `size` bytes, with no add-on. The first setpoint is that of reference tick 0.
 #[unsafe(no_mangle)]
@@ -30,7 +30,9 @@ pub unsafe extern "C" fn impromptu_flight_create(
             if settings.check().is_err() {
                 return Err(Status::Settings);
             }
-            made.write(Stack { flight: EMPTY }).flight.configure(&settings);
+            let stack = made.write(EMPTY);
+            stack.flight.configure(&settings);
+            stack.period = 1.0 / settings.rates.reference_hz();
             Ok(())
         })
     }
@@ -54,13 +56,56 @@ pub unsafe extern "C" fn impromptu_flight_attach(
 
 /// Appends the desired state of the next reference tick, as far ahead as impromptu_description.future says. One that is not
 /// finite, or that no vehicle can be asked for, gives IMPROMPTU_STATUS_NOT_FINITE and is not stored: the next one is still that
-/// of the same tick.
+/// of the same tick. After impromptu_flight_brake it gives IMPROMPTU_STATUS_BRAKING.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_flight_push(flight: *mut FlightMemory, setpoint: *const Setpoint) -> Status {
     report(|| {
         // SAFETY: the module's rules.
         let (flight, setpoint) = unsafe { (object::<Stack>(flight)?, input(setpoint)?) };
         flight.push(&setpoint)
+    })
+}
+
+/// Replaces what is stored from reference tick `tick` on, which must not have been flown: `setpoint` is the new trajectory's
+/// first, and further ones are pushed. What it differs by from the old one fades within 5 m/s and 3 m/s^2, so that nothing
+/// jumps. It ends a brake.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_flight_replan(flight: *mut FlightMemory, tick: i32, setpoint: *const Setpoint) -> Status {
+    report(|| {
+        // SAFETY: the module's rules.
+        let (flight, setpoint) = unsafe { (object::<Stack>(flight)?, input(setpoint)?) };
+        flight.replan(tick, &setpoint)
+    })
+}
+
+/// Replaces what is stored after the present by coming to rest within 3 m/s^2 and 8 m/s^3, and resting there until
+/// impromptu_flight_replan.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_flight_brake(flight: *mut FlightMemory) -> Status {
+    report(|| {
+        // SAFETY: the module's rules.
+        unsafe { object::<Stack>(flight)?.brake() };
+        Ok(())
+    })
+}
+
+/// Lets lanes act again that the guard has handed over for good. What is still wrong hands them over again.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_flight_rearm(flight: *mut FlightMemory) -> Status {
+    report(|| {
+        // SAFETY: the module's rules.
+        unsafe { object::<Stack>(flight)?.rearm() }
+    })
+}
+
+/// States whether the vehicle is in the air (not 0), which a loop that is closed on the ground cannot know: until it is, no lane
+/// acts, and nothing is integrated or learned. It is from the start on.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_flight_set_airborne(flight: *mut FlightMemory, airborne: c_int) -> Status {
+    report(|| {
+        // SAFETY: the module's rules.
+        unsafe { object::<Stack>(flight)?.flight.set_airborne(airborne != 0) };
+        Ok(())
     })
 }
 

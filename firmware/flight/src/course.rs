@@ -1,4 +1,4 @@
-//! The trajectory that the vehicle flies, made from what its link says of it.
+//! The trajectory that the vehicle flies, made from what a sender says of it.
 //!
 //! *in* setpoints with their ticks, re-plans and brakes; *out* setpoints of the flight stack, one for each reference tick;
 //! *never* a jump of the position from one tick to the next that the sender did not ask for with setpoints that came in time;
@@ -14,7 +14,6 @@
 
 use crate::{
     flight::{Flight, PREVIEW},
-    link::{Reason, message::TimedSetpoint},
     motion::{Blend, Brake, MotionLimits, between},
     types::Setpoint,
 };
@@ -28,13 +27,25 @@ const AHEAD: i32 = 128;
 
 /// Where the flight is.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Now {
+pub struct Now {
     /// Reference tick that is flown next, or is being flown.
-    pub(super) tick: i32,
+    pub tick: i32,
     /// The last one that was flown, if one was.
-    pub(super) flown: Option<i32>,
+    pub flown: Option<i32>,
     /// Seconds from one to the next.
-    pub(super) period: f32,
+    pub period: f32,
+}
+
+/// Why a setpoint was not taken. Nothing changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// The vehicle brakes, or rests where it has braked: only a re-plan goes on.
+    Braking,
+    /// The tick has been flown, or lies further ahead than the preview keeps.
+    Tick {
+        /// The next one that can be taken.
+        expected: i32,
+    },
 }
 
 /// Where setpoints come from.
@@ -50,7 +61,7 @@ enum Plan {
 
 /// The trajectory's source, and its newest setpoint.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Course {
+pub struct Course {
     plan: Plan,
     newest: Setpoint,
     /// `None`: [`MotionLimits::DEFAULT`], so that a static with it is all zeros.
@@ -59,10 +70,10 @@ pub(super) struct Course {
 
 impl Course {
     /// Of no trajectory.
-    pub(super) const NONE: Self = Self { plan: Plan::Follow, newest: Setpoint::ORIGIN, limits: None };
+    pub const NONE: Self = Self { plan: Plan::Follow, newest: Setpoint::ORIGIN, limits: None };
 
     /// How fast the vehicle is moved by itself; `false`, and nothing changes, if no vehicle can be moved so.
-    pub(super) fn limit(&mut self, limits: MotionLimits) -> bool {
+    pub fn limit(&mut self, limits: MotionLimits) -> bool {
         let physical = limits.is_physical();
         if physical {
             self.limits = Some(limits);
@@ -71,41 +82,43 @@ impl Course {
     }
 
     /// For the next flight.
-    pub(super) fn reset(&mut self) {
+    pub fn reset(&mut self) {
         (self.plan, self.newest) = (Plan::Follow, Setpoint::ORIGIN);
     }
 
-    /// Appends a sample of the desired trajectory, and what was lost before it.
+    /// Appends a sample of the desired trajectory, and what was lost before it. A tick that is stored already changes nothing.
+    ///
+    /// # Errors
+    /// While it brakes, or if the tick has been flown or is too far ahead.
     // Apart from the other commands, which need none of its stack.
     #[inline(never)]
-    pub(super) fn follow(&mut self, flight: &mut Flight<'_>, now: &Now, timed: &TimedSetpoint) -> Result<(), Reason> {
+    pub fn follow(&mut self, flight: &mut Flight<'_>, now: &Now, tick: i32, setpoint: &Setpoint) -> Result<(), Refusal> {
         if matches!(self.plan, Plan::Brake { .. }) {
-            return Err(Reason::Braking);
+            return Err(Refusal::Braking);
         }
         let next = flight.next_setpoint();
-        let gap = timed.tick.wrapping_sub(next);
+        let gap = tick.wrapping_sub(next);
         if gap < 0 {
             // A copy, or overtaken; but what is older than anything that can be stored is of a sender that started again.
-            return if gap < -(PREVIEW as i32) { Err(Reason::Setpoint { expected: next }) } else { Ok(()) };
+            return if gap < -(PREVIEW as i32) { Err(Refusal::Tick { expected: next }) } else { Ok(()) };
         }
         // What lies further ahead than the preview would push out the present.
-        if timed.tick.wrapping_sub(now.tick) >= PREVIEW as i32 || (next == 0 && gap > 0) {
-            return Err(Reason::Setpoint { expected: next });
+        if tick.wrapping_sub(now.tick) >= PREVIEW as i32 || (next == 0 && gap > 0) {
+            return Err(Refusal::Tick { expected: next });
         }
-        let setpoint = timed.setpoint();
         if let Some(flown) = now.flown
             && flown.wrapping_sub(next) >= 0
         {
-            if timed.tick.wrapping_sub(flown) <= 0 {
-                return Err(Reason::Setpoint { expected: flown.wrapping_add(1) });
+            if tick.wrapping_sub(flown) <= 0 {
+                return Err(Refusal::Tick { expected: flown.wrapping_add(1) });
             }
             if (setpoint.position - self.newest.position).norm() > RESUMES {
-                return self.replan(flight, now, timed);
+                return self.replan(flight, now, tick, setpoint);
             }
             self.fill(flight, flown.wrapping_add(1));
         }
-        let seen = self.seen(timed.tick, &setpoint, now.period);
-        let gap = timed.tick.wrapping_sub(flight.next_setpoint());
+        let seen = self.seen(tick, setpoint, now.period);
+        let gap = tick.wrapping_sub(flight.next_setpoint());
         let start = self.newest;
         for missing in 1..=gap {
             let share = missing as f32 / (gap + 1) as f32;
@@ -115,35 +128,50 @@ impl Course {
         Ok(())
     }
 
-    /// Replaces what is stored from a tick on; the sample is the new trajectory's first.
-    pub(super) fn replan(&mut self, flight: &mut Flight<'_>, now: &Now, timed: &TimedSetpoint) -> Result<(), Reason> {
-        let first = now.flown.map_or(0, |flown| flown.wrapping_add(1));
-        let ahead = timed.tick.wrapping_sub(first);
-        if ahead < 0 || timed.tick.wrapping_sub(now.tick) >= PREVIEW as i32 || (flight.next_setpoint() == 0 && ahead > 0) {
-            return Err(Reason::Setpoint { expected: first });
+    /// Appends a sample of the desired trajectory for the tick after the last one, as it is.
+    ///
+    /// # Errors
+    /// While it brakes.
+    pub fn append(&mut self, flight: &mut Flight<'_>, now: &Now, setpoint: &Setpoint) -> Result<(), Refusal> {
+        if self.braking() {
+            return Err(Refusal::Braking);
         }
-        let setpoint = timed.setpoint();
-        let before = timed.tick.wrapping_sub(1);
-        self.fill(flight, timed.tick);
-        if timed.tick == 0 && now.flown.is_none() {
+        let seen = self.seen(flight.next_setpoint(), setpoint, now.period);
+        self.push(flight, &seen);
+        Ok(())
+    }
+
+    /// Replaces what is stored from a tick on; the sample is the new trajectory's first. It ends a brake.
+    ///
+    /// # Errors
+    /// If the tick has been flown or is too far ahead.
+    pub fn replan(&mut self, flight: &mut Flight<'_>, now: &Now, tick: i32, setpoint: &Setpoint) -> Result<(), Refusal> {
+        let first = now.flown.map_or(0, |flown| flown.wrapping_add(1));
+        let ahead = tick.wrapping_sub(first);
+        if ahead < 0 || tick.wrapping_sub(now.tick) >= PREVIEW as i32 || (flight.next_setpoint() == 0 && ahead > 0) {
+            return Err(Refusal::Tick { expected: first });
+        }
+        let before = tick.wrapping_sub(1);
+        self.fill(flight, tick);
+        if tick == 0 && now.flown.is_none() {
             // On the ground there is nothing that it has to fit to.
             flight.clear_setpoints(0);
             self.plan = Plan::Follow;
         } else {
             let old = flight.setpoint(before);
-            flight.replace_setpoints(timed.tick);
-            let back = Setpoint { position: setpoint.position - setpoint.velocity * now.period, ..setpoint };
+            flight.replace_setpoints(tick);
+            let back = Setpoint { position: setpoint.position - setpoint.velocity * now.period, ..*setpoint };
             let blend = Blend::new(&old, &back, self.limits.as_ref().unwrap_or(&MotionLimits::DEFAULT));
             self.plan = Plan::Blend { start: before, blend };
             self.newest = old;
         }
-        let seen = self.seen(timed.tick, &setpoint, now.period);
+        let seen = self.seen(tick, setpoint, now.period);
         self.push(flight, &seen);
         Ok(())
     }
 
     /// Replaces what is stored after the present by coming to rest.
-    pub(super) fn brake(&mut self, flight: &mut Flight<'_>, now: &Now) {
+    pub fn brake(&mut self, flight: &mut Flight<'_>, now: &Now) {
         if matches!(self.plan, Plan::Brake { .. }) {
             return;
         }
@@ -157,7 +185,7 @@ impl Course {
     }
 
     /// Goes on with a brake as time does.
-    pub(super) fn keep_up(&mut self, flight: &mut Flight<'_>, now: &Now) {
+    pub fn keep_up(&mut self, flight: &mut Flight<'_>, now: &Now) {
         let Plan::Brake { start, brake } = self.plan else { return };
         // A trajectory that has begun anew is shorter than the preview; the bound is for a tick that jumps.
         for _ in 0..PREVIEW {
@@ -170,7 +198,7 @@ impl Course {
     }
 
     /// Whether the vehicle brakes, or rests where it has braked.
-    pub(super) fn braking(&self) -> bool {
+    pub fn braking(&self) -> bool {
         matches!(self.plan, Plan::Brake { .. })
     }
 
