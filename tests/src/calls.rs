@@ -37,7 +37,7 @@ struct Aligned<const N: usize>([u8; N]);
 
 static INT8: Aligned<964> = Aligned(*include_bytes!("../golden/models/int8-lane.model"));
 static FLOAT: Aligned<1360> = Aligned(*include_bytes!("../golden/models/float-skip.model"));
-const _: () = assert!(align_of::<Aligned<1>>() == file::ALIGNMENT as usize);
+const _: () = assert!(align_of::<Aligned<1>>() == file::ALIGNMENT);
 
 /// The golden models: one with everything, one with a network alone.
 static MODELS: LazyLock<[Model<'static>; 2]> = LazyLock::new(|| {

@@ -14,7 +14,7 @@ use impromptu_flight::{
     types::{Setpoint, State, Tick},
 };
 
-use super::{MODEL, answer, crazyflie, judge, setpoint, settings, state};
+use super::vehicle::{MODEL, answer, crazyflie, judge, setpoint, settings, state};
 use crate::bytes::Bytes;
 
 /// A vehicle at the end of a line.
