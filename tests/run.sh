@@ -4,7 +4,7 @@
 # usage: tests/run.sh        everything, the emulated microcontroller included
 #        tests/run.sh fast   format, lints and unit tests
 #        tests/run.sh long   what is too long for everything: whole tables, fuzzing for minutes
-# IMPROMPTU_FUZZ_SECONDS: how long the decoders are fuzzed, both together (20; long: 600)
+# IMPROMPTU_FUZZ_SECONDS: how long is fuzzed, all targets together (20; long: 600)
 set -eu
 cd "$(dirname "$0")/.."
 tier=${1:-all}
@@ -255,23 +255,25 @@ other_simulators() {
     cargo check --manifest-path tests/peers/Cargo.toml --package impromptu-plant-benchmark --benches --locked
 }
 
-# Half of the time for each. Without a sanitizer the toolchain need not be a nightly one. In safe Rust a read out of bounds is a
-# panic, an overflow too (cargo-fuzz turns the checks on).
-# fuzz DECODER LENGTH SEEDS...
+# A quarter of the time for each. Without a sanitizer the toolchain need not be a nightly one. In safe Rust a read out of bounds
+# is a panic, an overflow too (cargo-fuzz turns the checks on).
+# fuzz TARGET LENGTH SEEDS...
 fuzz() {
-    decoder=$1 length=$2
+    fuzzed=$1 length=$2
     shift 2
-    mkdir -p "tests/fuzz/corpus/$decoder"
-    cargo fuzz run --fuzz-dir tests/fuzz --sanitizer none "$decoder" "tests/fuzz/corpus/$decoder" "$@" -- \
-        -max_total_time=$(((IMPROMPTU_FUZZ_SECONDS + 1) / 2)) -max_len="$length" -print_final_stats=1
+    mkdir -p "tests/fuzz/corpus/$fuzzed"
+    cargo fuzz run --fuzz-dir tests/fuzz --sanitizer none "$fuzzed" "tests/fuzz/corpus/$fuzzed" "$@" -- \
+        -max_total_time=$(((IMPROMPTU_FUZZ_SECONDS + 3) / 4)) -max_len="$length" -print_final_stats=1
 }
 # fuzzing SECONDS
 fuzzing() {
     tool cargo-fuzz
     IMPROMPTU_FUZZ_SECONDS=${IMPROMPTU_FUZZ_SECONDS:-$1}
-    say "fuzzing the decoders for $IMPROMPTU_FUZZ_SECONDS s"
+    say "fuzzing for $IMPROMPTU_FUZZ_SECONDS s"
     fuzz decoder 4096 tests/golden/models
     fuzz link 1024
+    fuzz calls 2048
+    fuzz settings 2048
 }
 
 case $tier in

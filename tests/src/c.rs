@@ -4,7 +4,7 @@
 
 use std::{
     fs::{self, File},
-    io::ErrorKind,
+    io::{self, ErrorKind, Write},
     path::{Path, PathBuf},
     process::{Command, Output, Stdio},
     time::Duration,
@@ -17,6 +17,9 @@ use crate::emulator::{self, TARGET, require_target, target_folder, tool, workspa
 
 /// What every C compiler must accept without a word.
 pub const STRICT: [&str; 5] = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-O2"];
+
+/// What finds wrong uses of memory, and what C does not define; the first one ends the program.
+const SANITIZED: [&str; 3] = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer"];
 
 /// The core of the STM32F405, as the Crazyflie's firmware names it too.
 const CORE: [&str; 4] = ["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"];
@@ -97,6 +100,22 @@ impl Machine {
         ensure!(output.status.success(), "the program failed ({}):\n{}", output.status, text(&output.stderr));
         Ok(text(&output.stdout))
     }
+}
+
+/// The flags with which a program of this machine watches its memory, found out with a small one in `folder`. Without them the
+/// compiler is none that is missing: that is said, also by a test that passes.
+pub fn sanitizers(folder: &Path) -> Option<&'static [&'static str]> {
+    let (source, program) = (folder.join("small.c"), folder.join("small"));
+    let run = || -> Result<()> {
+        fs::write(&source, "int main(void);\nint main(void) { return 0; }\n")?;
+        finished(Machine::Host.compiler().args(SANITIZED).arg(&source).arg("-o").arg(&program))?;
+        finished(&mut Command::new(&program)).map(drop)
+    };
+    let Err(error) = run() else { return Some(&SANITIZED) };
+    // Not a macro's print, which is shown of failed tests alone.
+    let said = writeln!(io::stderr(), "C programs are NOT run under sanitizers here, which the compiler lacks: {error:#}");
+    assert!(said.is_ok());
+    None
 }
 
 /// Runs a compiler or linker to its end.

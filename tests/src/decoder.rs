@@ -12,8 +12,8 @@ use impromptu_firmware::{
     preview::{EndRule, Preview},
 };
 
-/// Inputs that break arithmetic which trusts them.
-const EXTREMES: [f32; 8] = [0.0, 1.0, -3.4e38, 3.4e38, 1e-40, f32::INFINITY, f32::NEG_INFINITY, f32::NAN];
+use crate::bytes::EXTREMES;
+
 /// Bounds of an application that are wider than any model's.
 const CAPS: Caps<'_> = Caps { channels: &[Cap { limit: 1e9, rate: 1e12 }; 2], sums: &[] };
 /// Samples that the adapter's preview holds here.

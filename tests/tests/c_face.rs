@@ -1,4 +1,4 @@
-//! The C face: its header is up to date, strict compilers accept it, and C programs get the bits of Rust.
+//! The C face: its header is up to date, strict compilers accept it, C programs get the bits of Rust, and no call does harm.
 
 use std::{
     env, fs,
@@ -32,6 +32,8 @@ use crate::board::{flight, model};
 /// 12 s: lanes come and go, the trajectory turns.
 const TICKS: u32 = 6_000;
 const TIMEOUT: Duration = Duration::from_secs(120);
+/// Calls from C in random order.
+const CALLS: u32 = 200_000;
 
 /// The bounds that the C programs give.
 const CAPS: Caps<'_> = Caps { channels: &caps::CHANNELS, sums: &[] };
@@ -181,10 +183,12 @@ fn floats<'a>(bytes: &mut Vec<u8>, numbers: impl IntoIterator<Item = &'a f32>) {
 fn a_c_program_gets_the_bits_of_rust_here_and_on_the_emulated_board() {
     let file = model::file(&model::TANH, Precision::Int8);
     let (script, expected) = script(&file);
-    for (machine, name) in [(Machine::Host, "c-host"), (Machine::Board, "c-board")] {
+    let mut machines = vec![(Machine::Host, "c-host", &[][..]), (Machine::Board, "c-board", &[])];
+    machines.extend(c::sanitizers(&folder("c-watched-small")).map(|flags| (Machine::Host, "c-watched", flags)));
+    for (machine, name, flags) in machines {
         let folder = folder(name);
         fs::write(folder.join("script.bin"), &script).unwrap();
-        let program = machine.program(&folder, &[], &["flight.c"]).unwrap();
+        let program = machine.program(&folder, flags, &["flight.c"]).unwrap();
         let sizes = machine.run(&program, &folder, TIMEOUT).unwrap();
         let answers = fs::read(folder.join("answers.bin")).unwrap();
         let differs = answers.iter().zip(&expected).position(|(a, b)| a != b);
@@ -199,6 +203,33 @@ fn a_c_program_gets_the_bits_of_rust_here_and_on_the_emulated_board() {
         assert!(sizes["adapter"].as_u64().unwrap() > 12_288, "{sizes}");
         println!("{name}: {sizes}");
     }
+}
+
+/// Makes so many random calls, under sanitizers where the compiler has them.
+fn call_at_random(name: &str, seed: u32, calls: u32) {
+    let folder = folder(name);
+    fs::write(folder.join("model.bin"), model::file(&model::TANH, Precision::Int8)).unwrap();
+    let (seed, calls) = (format!("-DSEED={seed}u"), format!("-DCALLS={calls}u"));
+    let flags = [&[&*seed, &calls], c::sanitizers(&folder).unwrap_or_default()].concat();
+    let program = Machine::Host.program(&folder, &flags, &["calls.c"]).unwrap();
+    let report = Machine::Host.run(&program, &folder, TIMEOUT).unwrap();
+    println!("{report}");
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    // Neither a test of refusals alone, nor of lanes that never came.
+    let counts = ["done", "refused", "corrected", "faded_in"].map(|count| report[count].as_u64().unwrap());
+    assert!(counts.iter().all(|count| *count > 0) && counts[0] > u64::from(CALLS) / 4, "{report}");
+}
+
+#[test]
+fn random_calls_from_c_are_done_or_refused_and_harm_nothing() {
+    call_at_random("c-calls-1", 1, CALLS);
+    call_at_random("c-calls-2", 2, CALLS);
+}
+
+#[test]
+#[ignore = "long"]
+fn long_forty_times_as_many_random_calls_from_c_are_done_or_refused() {
+    call_at_random("c-calls-long", 3, 80 * CALLS);
 }
 
 /// The model as the example's Kbuild file puts it into the program.

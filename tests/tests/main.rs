@@ -2,7 +2,8 @@
 //!
 //! - [`demo`]: what `cargo run --release` shows, threshold by threshold, and that the README tells the same;
 //! - [`board`]: whole flights on the emulated microcontroller, bit by bit, with golden instruction counts;
-//! - [`c_face`]: C programs get the bits of Rust, and the header is what the source says;
+//! - [`c_face`]: C programs get the bits of Rust, the header is what the source says, random calls do no harm;
+//! - [`calls`]: calls to an add-on in any order, and any settings and commands: within all bounds, or refused, never a panic;
 //! - [`decoder`]: mutated model files are refused or flown, never a panic;
 //! - [`elf`]: what a control tick can reach in the flashed binary: no panic, no heap; its stack, with golden memory;
 //! - [`guard`]: lanes that do harm are handed over before the error is 1.5 times the baseline's, with numbers;
@@ -23,6 +24,7 @@
 
 mod board;
 mod c_face;
+mod calls;
 mod decoder;
 mod demo;
 mod elf;

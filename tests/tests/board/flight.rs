@@ -4,11 +4,12 @@ use std::collections::VecDeque;
 
 use impromptu_firmware::{adapter::Lanes, model::Model, network::Scratch};
 use impromptu_flight::{
-    control::{Airframe, AttitudeGains, PositionGains},
-    flight::{Flight, Rates, Settings},
+    control::Airframe,
+    flight::Flight,
     replay::{Event, Recorded, Recorder},
     types::{MotorCommand, Setpoint, State, Tick},
 };
+use impromptu_tests::settings::crazyflie;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Seconds for each control tick.
@@ -19,25 +20,6 @@ const DELAY: usize = 6;
 const AHEAD: u32 = 120;
 /// The trajectory's last reference tick: before the flight's end, so that its end rules are flown too.
 const LAST_SETPOINT: u32 = 1_400;
-
-/// A Crazyflie 2.1, about.
-fn settings() -> Settings {
-    let arm = 0.0325;
-    Settings {
-        airframe: Airframe {
-            mass: 0.03,
-            inertia: [1.43e-5, 1.43e-5, 2.89e-5],
-            rotors: [[arm, arm], [arm, -arm], [-arm, -arm], [-arm, arm]],
-            directions: [1.0, -1.0, 1.0, -1.0],
-            thrust_coefficient: 2.3e-8,
-            torque_coefficient: 7.8e-10,
-            max_rotor_speed: 2_500.0,
-        },
-        position: PositionGains { kp: [6.5, 6.5, 15.0], kd: [4.0, 4.0, 9.0], ki: [0.5, 0.5, 0.5], integral_limit: 0.5 },
-        attitude: AttitudeGains { kp: 544.0, kd: 46.64 },
-        rates: Rates::default(),
-    }
-}
 
 /// The vehicle: heavier than the loop believes, with drag and slow motors.
 struct Vehicle {
@@ -91,7 +73,7 @@ fn setpoint(reference_tick: u32) -> Setpoint {
 /// # Panics
 /// If the vehicle does not stay near its trajectory: such a flight would prove little.
 pub(crate) fn fly(addon: Option<(&Model<'_>, Lanes)>, ticks: u32, switches: impl Fn(u32) -> Option<Event>) -> Recorded<Vec<u8>> {
-    let settings = settings();
+    let settings = crazyflie();
     let mut recorder = Recorder::new(&settings, addon);
     let mut flight = Flight::new(&settings).unwrap();
     let mut scratch = Scratch::new();
