@@ -194,7 +194,7 @@ fn outcome(
 fn harm(twin: &[f64], assisted: &Flown, rate_hz: f64) -> Option<Harm> {
     let ticks = (WINDOW_S * rate_hz) as usize;
     let [twin, errors] = [twin, &assisted.squared_errors()].map(|squares| windows(squares, ticks));
-    let harmful = |(error, twin): (&f64, &f64)| !(*error <= HARM_FACTOR * twin + HARM_MORE);
+    let harmful = |(error, twin): (&f64, &f64)| *error > HARM_FACTOR * twin + HARM_MORE || error.is_nan();
     let first = errors.iter().zip(&twin).position(harmful)?;
     // The last tick of that window.
     let begin = first + ticks - 1;
