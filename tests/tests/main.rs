@@ -7,6 +7,7 @@
 //! - [`decoder`]: mutated model files are refused or flown, never a panic;
 //! - [`elf`]: what a control tick can reach in the flashed binary: no panic, no heap; its stack, with golden memory;
 //! - [`guard`]: lanes that do harm are handed over before the error is 1.5 times the baseline's, with numbers;
+//! - [`healthy`]: hours of flights in which nothing is wrong: the guard trips in none;
 //! - [`hostile`]: whatever is desired, flown and measured: where both lanes are worse than the baseline, with a golden table;
 //! - [`emulator`]: the emulator is found, fails loudly, and counts repeatably;
 //! - [`mcu`]: what kernels cost on the microcontroller, beside other engines, with a golden table;
@@ -30,6 +31,7 @@ mod demo;
 mod elf;
 mod emulator;
 mod guard;
+mod healthy;
 mod hostile;
 mod image;
 mod kernels;

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use impromptu_reproduction::robustness::Fault;
 use impromptu_sim::trajectory::{Sample, Trajectory, figure_eight, strokes};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -38,27 +39,6 @@ pub(crate) enum Desired {
     Strokes {
         seed: u64,
         speed: f64,
-    },
-}
-
-/// What is wrong with what the loop and the add-on are told.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Fault {
-    None,
-    /// The measured position stands still from this time on, for so long.
-    Frozen {
-        at: f64,
-        seconds: f64,
-    },
-    /// The measured position is elsewhere for one reference tick, each so often.
-    Jumps {
-        size: f64,
-        each: f64,
-    },
-    /// No setpoint comes from this time on for so long: the trajectory reaches less far ahead from then on.
-    Starved {
-        at: f64,
-        seconds: f64,
     },
 }
 

@@ -9,22 +9,11 @@ use std::{
     thread,
 };
 
-use impromptu_firmware::{adapter::Lanes, guard::Trips, model::Model, network::Scratch};
-use impromptu_flight::{
-    flight::{Flight, PREVIEW},
-    types::{MotorCommand, Reference, Setpoint, State, Tick},
-};
-use impromptu_reproduction::robustness::Mismatch;
-use impromptu_sim::{
-    condition::Condition,
-    flights::Loop,
-    plant::Vehicle,
-    rollout::{FaultyFlight, FlightPlan, FlightStack, fly_on},
-    trajectory::Trajectory,
-};
-use nalgebra::Vector3;
+use impromptu_firmware::model::Model;
+use impromptu_reproduction::robustness::{Change, Mismatch, handover::windows};
+use impromptu_sim::{condition::Condition, flights::Loop, plant::Vehicle, trajectory::Trajectory};
 
-use super::draw::{Draw, Fault};
+use super::draw::Draw;
 
 /// What the RMS error may be: this many times the baseline's, without and with delay added, and so much more, m.
 const FACTORS: [f64; 2] = [1.1, 1.5];
@@ -93,7 +82,9 @@ pub(crate) fn verdicts(models: &Models, draws: &[Draw]) -> Vec<Verdict> {
 
 fn judge(models: &Models, draw: &Draw) -> Verdict {
     let model = Model::from_bytes(&models.0[&(draw.vehicle, draw.condition)]).expect("a model");
-    let closed_loop = closed_loop(draw);
+    let condition = Condition::named(draw.condition).expect("a condition");
+    let closed_loop = Loop::new(Vehicle::named(draw.vehicle).expect("a vehicle"), "stock", condition).expect("a loop");
+    let closed_loop = change(draw).applied(&closed_loop);
     let rate_hz = closed_loop.rate_hz();
     let trajectory = draw.desired.trajectory(rate_hz, draw.direction);
     let flown = closed_loop.delayed(draw.delay_ms * 1e-3);
@@ -122,110 +113,19 @@ fn judge(models: &Models, draw: &Draw) -> Verdict {
     verdict
 }
 
-fn closed_loop(draw: &Draw) -> Loop {
-    let condition = Condition::named(draw.condition).expect("a condition");
-    let mut closed_loop = Loop::new(Vehicle::named(draw.vehicle).expect("a vehicle"), "stock", condition).expect("a loop");
-    let gains = &mut closed_loop.settings.position;
-    // With the damping that it had.
-    gains.kp = gains.kp.map(|gain| gain * draw.gains as f32);
-    gains.kd = gains.kd.map(|gain| gain * (draw.gains as f32).sqrt());
-    let noise = &mut closed_loop.condition.noise;
-    for sigma in [&mut noise.position, &mut noise.velocity, &mut noise.attitude, &mut noise.body_rates] {
-        *sigma *= draw.noise;
-    }
-    let wind_direction = draw.direction + 1.0;
-    Mismatch { thrust: draw.thrust, drag: draw.drag, wind: draw.wind, wind_direction, ..Mismatch::NONE }.applied(&closed_loop)
-}
-
-/// Root mean square over each `ticks` ticks.
-fn windows(squares: &[f64], ticks: usize) -> Vec<f64> {
-    squares.windows(ticks.min(squares.len())).map(|window| (window.iter().sum::<f64>() / window.len() as f64).sqrt()).collect()
+/// How the vehicle, its loop and what they are told differ in a draw.
+fn change(draw: &Draw) -> Change {
+    let mismatch = Mismatch {
+        thrust: draw.thrust,
+        drag: draw.drag,
+        wind: draw.wind,
+        wind_direction: draw.direction + 1.0,
+        ..Mismatch::NONE
+    };
+    Change { mismatch, gains: draw.gains, noise: draw.noise, fault: draw.fault, direction: draw.direction }
 }
 
 /// Squared error at each reference tick, m².
 fn squares(closed_loop: &Loop, draw: &Draw, model: Option<&Model<'_>>, trajectory: &Trajectory) -> Vec<f64> {
-    let settings = &closed_loop.settings;
-    let mut flight = Flight::new(settings).expect("a vehicle's settings");
-    if let Some(model) = model {
-        flight.attach(model, Lanes::BOTH).expect("a model for this loop");
-    }
-    let delay = closed_loop.condition.command_delay_ticks(settings.rates.control_hz.into());
-    let stack = Stack {
-        inside: FaultyFlight::new(flight, 1.0, delay),
-        scratch: Scratch::new(),
-        fault: draw.fault,
-        direction: draw.direction,
-        control_hz: settings.rates.control_hz.into(),
-        period: 1.0 / closed_loop.rate_hz(),
-        seconds: 0.0,
-        held: None,
-    };
-    let plan = FlightPlan { log: true, ..FlightPlan::new(trajectory, draw.number.into()) };
-    let record = fly_on(stack, &closed_loop.vehicle, settings, &closed_loop.condition, &plan).expect("a flight");
-    let square = |row: &impromptu_sim::flight_log::LogRow| {
-        let position = row.true_position.unwrap_or(row.measured_position);
-        (0..3).map(|axis| (row.desired.position[axis] - position[axis]).powi(2)).sum::<f64>()
-    };
-    record.log.expect("a log").rows.iter().map(square).collect()
+    change(draw).fly(closed_loop, model, trajectory, draw.number.into()).expect("a flight").squared_errors()
 }
-
-/// A flight stack to which faults happen.
-struct Stack<'m> {
-    inside: FaultyFlight<'m>,
-    scratch: Scratch,
-    fault: Fault,
-    direction: f64,
-    control_hz: f64,
-    /// Of the references, s.
-    period: f64,
-    /// Time of flight, s.
-    seconds: f64,
-    /// Position that stands still.
-    held: Option<Vector3<f32>>,
-}
-
-impl FlightStack for Stack<'_> {
-    fn push_setpoint(&mut self, setpoint: &Setpoint) {
-        let starved = match self.fault {
-            Fault::Starved { at, seconds } => (at..at + seconds).contains(&self.seconds),
-            _ => false,
-        };
-        if !starved {
-            self.inside.flight.push_setpoint(setpoint);
-        }
-    }
-
-    fn next_setpoint(&self) -> i32 {
-        self.inside.flight.next_setpoint()
-    }
-
-    fn set_dither(&mut self, offset: Vector3<f32>) {
-        self.inside.flight.set_dither(offset);
-    }
-
-    fn step(&mut self, tick: Tick, state: &State) -> MotorCommand {
-        self.seconds = f64::from(tick.0) / self.control_hz;
-        let mut told = *state;
-        match self.fault {
-            Fault::Frozen { at, seconds } if (at..at + seconds).contains(&self.seconds) => {
-                told.position = *self.held.get_or_insert(state.position);
-            }
-            Fault::Jumps { size, each } if self.seconds.rem_euclid(each) < self.period => {
-                told.position += Vector3::new(self.direction.cos(), self.direction.sin(), 0.0).map(|part| (size * part) as f32);
-            }
-            _ => {}
-        }
-        self.inside.step(tick, &told, &mut self.scratch)
-    }
-
-    fn reference(&self) -> &Reference {
-        self.inside.flight.reference()
-    }
-
-    fn trips(&mut self) -> Trips {
-        self.inside.flight.adapter().map(|adapter| adapter.trips()).unwrap_or_default()
-    }
-}
-
-// A draw starves for less than what is stored ahead.
-const _: () = assert!(PREVIEW > 80);

@@ -59,14 +59,9 @@ impl Comparison {
             .collect();
         let records = closed_loop.fly(&plans)?;
         let errors = |way: usize| -> Vec<f64> { way_of(&records, way, flights.len()).map(|record| record.rms).collect() };
-        let mut trips = [0; Trip::ALL.len()];
-        let mut tripped = 0;
-        for record in way_of(&records, 2, flights.len()) {
-            tripped += usize::from(record.trips != Trips::default());
-            for (count, trip) in trips.iter_mut().zip(Trip::ALL) {
-                *count += u32::from(record.trips.of(trip));
-            }
-        }
+        let of_both = || way_of(&records, 2, flights.len()).map(|record| &record.trips);
+        let tripped = of_both().filter(|trips| **trips != Trips::default()).count();
+        let trips = by_reason(of_both());
         Ok(Self { baseline: errors(0), network: errors(1), both: errors(2), tripped, trips })
     }
 
@@ -87,9 +82,25 @@ impl Comparison {
 
     /// Trips by reason in words; empty if there were none.
     pub fn trips_text(&self) -> String {
-        let counts = Trip::ALL.iter().zip(self.trips).filter(|(_, count)| *count > 0);
-        counts.map(|(trip, count)| format!("{} {count}", trip.name())).collect::<Vec<_>>().join(", ")
+        trips_text(&self.trips)
     }
+}
+
+/// Trips of both lanes together, by [`Trip::index`].
+pub(super) fn by_reason<'a>(all: impl Iterator<Item = &'a Trips>) -> [u32; Trip::ALL.len()] {
+    let mut counts = [0; Trip::ALL.len()];
+    for trips in all {
+        for (count, trip) in counts.iter_mut().zip(Trip::ALL) {
+            *count += u32::from(trips.of(trip));
+        }
+    }
+    counts
+}
+
+/// Trips by [`Trip::index`] in words; empty if there were none.
+pub(super) fn trips_text(trips: &[u32; Trip::ALL.len()]) -> String {
+    let counts = Trip::ALL.iter().zip(trips).filter(|(_, count)| **count > 0);
+    counts.map(|(trip, count)| format!("{} {count}", trip.name())).collect::<Vec<_>>().join(", ")
 }
 
 fn way_of(records: &[FlightRecord], way: usize, flights: usize) -> impl Iterator<Item = &FlightRecord> {

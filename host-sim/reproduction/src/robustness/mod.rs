@@ -9,7 +9,10 @@ pub mod control_weight;
 mod deviations;
 pub mod draw;
 pub mod draws;
+mod faults;
 pub mod gaussian;
+mod guard_table;
+pub mod handover;
 pub mod hover;
 pub mod ledger;
 mod mismatch;
@@ -30,6 +33,7 @@ pub use cases::{CASES, Case, DEVIATIONS, PARAMETERS, Parameter, WINDS, wind};
 pub use comparison::Comparison;
 pub use deviations::{Deviations, fly_cases, fly_deviations};
 pub use draw::name;
+pub use faults::{Change, Fault, Flown, LaneTick};
 pub use mismatch::Mismatch;
 pub use settings::Settings;
 
@@ -76,6 +80,8 @@ fn study_loop(settings: &Settings, closed_loop: &Loop, observer: &dyn Observer) 
         DrawSettings::new(closed_loop, &model, settings.seed, settings.draws, settings.draw_strokes, settings.ranges.clone());
     let content = fly_draws(&Header { settings: draws, shard: Shard::WHOLE }, closed_loop, &model, &path, &|_, _| {})?;
     spread::tell(&mut study, &slug_of(closed_loop), &content);
+    observer.stage(&format!("{name}: trips of the guard"));
+    guard_table::tell(&mut study, closed_loop, &handover::fly_kinds(closed_loop, &model, settings.guard_flights, seed)?);
     observer.stage(&format!("{name}: control weight of the feedback lane"));
     let designs = control_weight::sweep(&settings.recipe, closed_loop, &built, &trajectories, settings.seed, seed)?;
     let baseline = closed_loop.errors(&trajectories, None, 1.0, seed)?;

@@ -72,6 +72,7 @@ pub(super) fn explain(study: &mut Study, settings: &Settings) {
             ranges.wind
         ),
     );
+    super::guard_table::explain(study, settings);
     study.note(
         CONTROL_WEIGHT_SECTION,
         "Each point is a lane designed at another control weight from the same logs, flown without the guard. The limit knows \

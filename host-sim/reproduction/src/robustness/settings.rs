@@ -20,6 +20,8 @@ pub struct Settings {
     pub draws: u32,
     /// Strokes that each of them flies.
     pub draw_strokes: usize,
+    /// Flights of each kind in the table of the guard's trips.
+    pub guard_flights: u32,
     /// Ranges of the draws.
     pub ranges: Ranges,
     /// Recipe of the models.

@@ -14,6 +14,7 @@ use super::{
     control_weight::CONTROL_WEIGHTS,
     draw::{DrawSettings, Ranges},
     draws::fly_draws,
+    handover::KINDS,
     ledger::{Header, LedgerError, Shard, merge},
     run,
 };
@@ -50,6 +51,7 @@ fn the_study_tells_every_case_deviation_vehicle_and_control_weight() {
         strokes: 6,
         draws: 3,
         draw_strokes: 2,
+        guard_flights: 4,
         ranges: Ranges::default(),
         recipe: small(),
         out: folder.path().to_owned(),
@@ -84,6 +86,11 @@ fn the_study_tells_every_case_deviation_vehicle_and_control_weight() {
     }
     assert!(curves("wind").iter().all(|curve| curve.points.len() == WINDS.len()));
     curves("draws");
+
+    // The guard leaves what is healthy alone, and trips where positions are frozen.
+    let trips = |kind: &str| value(&format!("guard_{kind}_network_trips")) + value(&format!("guard_{kind}_feedback_trips"));
+    assert!(KINDS.iter().all(|kind| value(&format!("guard_{}_flights", kind.name)) == 4.0));
+    assert!(trips("nominal") == 0.0 && trips("frozen") > 0.0, "{} {}", trips("nominal"), trips("frozen"));
 
     // Margins are bought with reduction, and no lane is better than the one that knows everything.
     let figures = ["control_weight", "delay_margin", "modulus_margin", "margins"].map(curves);

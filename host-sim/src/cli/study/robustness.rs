@@ -28,8 +28,9 @@ use crate::cli::{
 #[command(after_help = "\
 A model is built for each vehicle and condition and flown with mass, thrust, drag, delay, disturbance and wind that it was not \
 made for, one at a
-time and, in the Monte Carlo run, all at once; then the control weight of the feedback lane is swept. The draws are kept in the \
-folder
+time and, in the Monte Carlo run, all at once; how soon the guard hands over where the add-on does harm is counted; then the \
+control weight
+of the feedback lane is swept. The draws are kept in the folder
 (draws-*.jsonl): the same command goes on with them.
 
 Examples:
@@ -48,6 +49,9 @@ pub(super) struct Robustness {
     /// Number of test strokes.
     #[arg(long, value_name = "N", default_value = "30", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     strokes: u32,
+    /// Flights of each kind of change in the table of the guard's trips, for each loop.
+    #[arg(long, value_name = "N", default_value = "24", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    guard_flights: u32,
     #[command(flatten)]
     draw: Drawn,
 }
@@ -91,6 +95,7 @@ impl Robustness {
             strokes: self.strokes as usize,
             draws: self.draw.draws,
             draw_strokes: self.draw.draw_strokes as usize,
+            guard_flights: self.guard_flights,
             ranges: self.draw.ranges()?,
             recipe: invocation.configuration.recipe().clone(),
             out: invocation.configuration.folder()?,
