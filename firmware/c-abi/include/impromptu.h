@@ -54,17 +54,17 @@
 
 #if defined(IMPROMPTU_POINTER_32)
 // Words of 8 bytes of an impromptu_adapter.
-#define IMPROMPTU_ADAPTER_WORDS 2720
+#define IMPROMPTU_ADAPTER_WORDS 2736
 #endif
 
 #if defined(IMPROMPTU_POINTER_64)
 // Words of 8 bytes of an impromptu_flight.
-#define IMPROMPTU_FLIGHT_WORDS 2080
+#define IMPROMPTU_FLIGHT_WORDS 2096
 #endif
 
 #if defined(IMPROMPTU_POINTER_32)
 // Words of 8 bytes of an impromptu_flight.
-#define IMPROMPTU_FLIGHT_WORDS 2080
+#define IMPROMPTU_FLIGHT_WORDS 2096
 #endif
 
 // Words of 8 bytes of an impromptu_scratch.

@@ -224,11 +224,11 @@ impl Counterfactual {
         let mean = 1.0 / ticks;
         self.head = if self.head == 0 { monitor.taps().saturating_sub(1) } else { self.head - 1 };
         let mut now = Energies::default();
-        let mut parts: [Parts; MAX_AXES] = [[0.0; 5]; MAX_AXES];
+        let (mut swung, seconds): (Parts, f32) = ([0.0; 5], ticks / rate_hz);
         let [mut acts, mut assisted] = [false; 2];
         let desired = self.references.iter_mut().zip(&mut self.desired).zip(&mut self.before);
-        let axes = monitor.axes().iter().zip(&mut self.contributions).zip(&mut self.errors).zip(&mut parts);
-        for (((((axis, response), contributions), error), parts), ((references, desired), before)) in axes.zip(desired) {
+        let axes = monitor.axes().iter().zip(&mut self.contributions).zip(&mut self.errors).zip(desired);
+        for (place, ((((axis, response), contributions), error), ((references, desired), before))) in axes.enumerate() {
             let with = *error * mean;
             *error = 0.0;
             // Relative to what is desired now: a response that ends too early is no error that grows with the position.
@@ -259,7 +259,8 @@ impl Counterfactual {
             now.without_feedback += unaided * unaided;
             now.network_only += (unaided + more) * (unaided + more);
             now.baseline += (unaided - network) * (unaided - network);
-            *parts = [with, unaided, feedback, nominal, with - before[LATER - 1]];
+            let parts = [with, unaided, feedback, nominal, with - before[LATER - 1]];
+            self.swing.add(place, &parts, settings, seconds, &mut swung);
             before.rotate_right(1);
             before[0] = feedback;
         }
@@ -284,6 +285,6 @@ impl Counterfactual {
         // While the network acts, what is measured must be worse too.
         let network = worse(past.network_only, baseline, factor) && (!acts || worse(past.with, baseline, factor));
         self.harmful = [network, worse(past.with, past.without_feedback + share, settings.counterfactual_factor)];
-        self.swing.observe(&parts, monitor.validated_rms(), settings, ticks / rate_hz);
+        self.swing.observe(&swung, monitor.validated_rms(), settings, seconds);
     }
 }

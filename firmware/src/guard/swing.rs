@@ -97,19 +97,22 @@ impl Swing {
         }
     }
 
-    /// A monitor tick of this length, s.
-    #[inline(never)]
-    pub(super) fn observe(&mut self, axes: &[Parts; MAX_AXES], validated_rms: f32, settings: &GuardSettings, seconds: f32) {
+    /// Adds to `swung` the squares of what swings of an axis in a monitor tick of this length, s.
+    // Axis by axis, as the numbers of all would be the control task's deepest stack.
+    pub(super) fn add(&mut self, axis: usize, parts: &Parts, settings: &GuardSettings, seconds: f32, swung: &mut Parts) {
         let slow = ewma_gain(seconds / settings.swing_s);
+        let Some(means) = self.means.get_mut(axis) else { return };
+        for ((mean, value), square) in means.iter_mut().zip(parts).zip(swung) {
+            *mean = finite_or_zero(*mean + (value - *mean) * slow);
+            *square += (value - *mean) * (value - *mean);
+        }
+    }
+
+    /// Ends a monitor tick of this length, s, in which this swung, all axes added.
+    #[inline(never)]
+    pub(super) fn observe(&mut self, swung: &Parts, validated_rms: f32, settings: &GuardSettings, seconds: f32) {
         let recent = ewma_gain(seconds / settings.astray_s);
-        for (part, energy) in self.energies.iter_mut().enumerate() {
-            let mut now = 0.0;
-            for (mean, parts) in self.means.iter_mut().zip(axes) {
-                if let (Some(mean), Some(value)) = (mean.get_mut(part), parts.get(part)) {
-                    *mean = finite_or_zero(*mean + (value - *mean) * slow);
-                    now += (value - *mean) * (value - *mean);
-                }
-            }
+        for (part, (energy, &now)) in self.energies.iter_mut().zip(swung).enumerate() {
             // Slower down than up: the loop may be later than nominal.
             let gain = if part == NOMINAL && now < *energy { 0.5 * recent } else { recent };
             *energy = finite_or_zero(*energy + (now - *energy) * gain);
@@ -153,9 +156,9 @@ mod tests {
         let (mut swing, settings) = (Swing::NONE, GuardSettings::default());
         for tick in 0..200 {
             swing.rely(network, true, &settings, TICK);
-            let mut axes = [[0.0; 5]; MAX_AXES];
-            axes[0] = parts(tick as f32 * TICK);
-            swing.observe(&axes, RMS, &settings, TICK);
+            let mut swung = [0.0; 5];
+            swing.add(0, &parts(tick as f32 * TICK), &settings, TICK, &mut swung);
+            swing.observe(&swung, RMS, &settings, TICK);
         }
         swing
     }
@@ -236,7 +239,7 @@ mod tests {
         let (mut swing, settings) = (after(|_| [0.0; 5], 1.0), GuardSettings::default());
         assert_eq!(swing.share(), 1.0);
         swing.rely(1.0, false, &settings, TICK);
-        swing.observe(&[[0.0; 5]; MAX_AXES], RMS, &settings, TICK);
+        swing.observe(&[0.0; 5], RMS, &settings, TICK);
         assert_eq!(swing.share(), settings.swing_start);
     }
 
@@ -248,7 +251,9 @@ mod tests {
             let (mut swing, settings) = (Swing::NONE, GuardSettings::default());
             for parts in values {
                 swing.rely(network, true, &settings, TICK);
-                swing.observe(&[parts; MAX_AXES], rms, &settings, TICK);
+                let mut swung = [0.0; 5];
+                (0..MAX_AXES).for_each(|axis| swing.add(axis, &parts, &settings, TICK, &mut swung));
+                swing.observe(&swung, rms, &settings, TICK);
                 prop_assert!((0.0..=1.0).contains(&swing.share()), "{}", swing.share());
             }
         }
