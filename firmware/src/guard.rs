@@ -97,6 +97,11 @@ impl Guard {
         Lanes { network: wanted.network && !self.network.tripped(), feedback: wanted.feedback && !self.feedback.tripped() }
     }
 
+    /// Share of the feedback lane that may act, 0..=1, where the model has a monitor: without one nobody knows what swings.
+    pub fn feedback_share(&self) -> f32 {
+        if self.settings.enabled { self.counterfactual.swing().share() } else { 1.0 }
+    }
+
     /// Whether the loop swings more than it may after what is desired.
     pub(crate) fn swinging(&self) -> bool {
         self.counterfactual.swing().swinging()
@@ -145,9 +150,7 @@ impl Guard {
         let handover_step = ewma_gain(1.0 / (self.settings.handover_s * self.rate_hz));
         // Without a trajectory there is nothing to correct.
         let allowed = if seen.trajectory { self.allowed(seen.wanted) } else { Lanes::NONE };
-        // Without a monitor nobody knows what swings.
-        let judged = self.settings.enabled && seen.monitor.is_some();
-        let share = if judged { self.counterfactual.swing().share() } else { 1.0 };
+        let share = if seen.monitor.is_some() { self.feedback_share() } else { 1.0 };
         Verdict { allowed, handover_step, share }
     }
 

@@ -6,7 +6,7 @@
 
 use impromptu_firmware::{
     adapter::Lanes,
-    guard::{GuardSettings, Trips},
+    guard::{Guard, GuardSettings, Trips},
     model::Model,
     network::Scratch,
 };
@@ -125,7 +125,7 @@ impl Flown {
 /// What the lanes do at a reference tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LaneTick {
-    /// How far network and feedback lane are faded in, 0..=1.
+    /// How far network and feedback lane act, 0..=1: faded in, and of the feedback lane what the guard lets act.
     pub weights: [f32; 2],
     /// Which lanes the guard lets act.
     pub allowed: Lanes,
@@ -214,7 +214,10 @@ impl FlightStack for FaultyStack<'_> {
             && let Some(adapter) = self.inside.flight.adapter()
         {
             let allowed = adapter.guard().map_or(Lanes::NONE, |guard| guard.allowed(Lanes::BOTH));
-            self.lanes.push(LaneTick { weights: adapter.weights(), allowed, trips: adapter.trips() });
+            let monitored = adapter.model().is_some_and(|model| model.monitor().is_some());
+            let share = adapter.guard().filter(|_| monitored).map_or(1.0, Guard::feedback_share);
+            let [network, feedback] = adapter.weights();
+            self.lanes.push(LaneTick { weights: [network, feedback * share], allowed, trips: adapter.trips() });
         }
         command
     }

@@ -31,11 +31,10 @@ pub(super) fn explain(study: &mut Study, settings: &Settings) {
         SECTION,
         &format!(
             "Harm begins where the RMS error over {WINDOW_S} s is more than {HARM_FACTOR} times the baseline's and {} cm more. \
-             It is over with the hand-over: the feedback lane is faded out or may not act, or a lane trips; where that \
-             was so before, the time is 0. The harm until then is the largest RMS error over {WINDOW_S} s less the baseline's. \
-             Only the first harm of a flight counts; where \
-             there is no hand-over after it, the rest of the flight does. Shares of the feedback lane that the guard takes away \
-             without a trip are no hand-over. Where the baseline is more than {LOST} m off, it is lost, and no harm is counted.",
+             It is over with the hand-over: nothing of the feedback lane acts any more, or a lane trips; where that was so \
+             before, the time is 0. The harm until then is the largest RMS error over {WINDOW_S} s less the baseline's. Only the \
+             first harm of a flight counts; where there is no hand-over after it, the rest of the flight does. Where the \
+             baseline is more than {LOST} m off, it is lost, and no harm is counted.",
             100.0 * HARM_MORE
         ),
     );
