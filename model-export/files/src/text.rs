@@ -36,14 +36,14 @@ pub fn line(text: &str) -> Cow<'_, str> {
     escaped(text, |_| false)
 }
 
-/// [`line`] of a field in place.
+/// [`line()`] of a field in place.
 pub fn mend(text: &mut String) {
     if let Cow::Owned(harmless) = line(text) {
         *text = harmless;
     }
 }
 
-/// A text of several lines that the program has laid out itself; the fields in it should have been made harmless by [`line`].
+/// A text of several lines that the program has laid out itself; the fields in it should have been made harmless by [`line()`].
 pub fn lines(text: &str) -> Cow<'_, str> {
     escaped(text, |character| character == '\n')
 }
