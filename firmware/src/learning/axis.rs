@@ -244,3 +244,30 @@ fn lags(rings: &[Ring<64>; 2], before: usize) -> [f32; FEEDBACK] {
         None => SCALE * rings[1].past(LAGS[index - LAGS.len()] + before),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(40))]
+
+        #[test]
+        fn a_correction_is_within_its_limits_whatever_comes_in(
+            signals in prop::collection::vec(prop_oneof![4 => any::<[f32; 3]>(), 6 => prop::array::uniform3(-2f32..2.0)], 1..60)
+        ) {
+            let response = Response::second_order(1.0, 8.0, 0.7, 0.02, 100.0).unwrap();
+            let mut learner = Learner::new(response, 100.0, 0.0);
+            learner.start(0.0);
+            let limits = Limits { correction: 0.5, feedback: 0.3 };
+            for tick in 0..600 {
+                let at = |tick: i32| signals[tick.rem_euclid(signals.len() as i32) as usize];
+                let [_, measured, rate] = at(tick);
+                let correction = learner.step(|offset| at(tick + offset)[0], measured, rate, Parts::BOTH, Parts::BOTH, &limits);
+                prop_assert!(correction.abs() <= limits.correction, "{correction} at {tick}");
+            }
+            prop_assert!(learner.preview.values().iter().chain(learner.feedback.values()).all(|value| value.is_finite()));
+        }
+    }
+}
