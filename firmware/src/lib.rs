@@ -70,6 +70,7 @@
 //! | 1 | `lanes` | which of the two lanes act |
 //! | 1 | `exchange` | hand-over between tasks without a lock: newest value, queue of bytes |
 //! | 2 | `format` | a model file: its bytes, the types that they become, why one is refused |
+//! | 2 | `learning` | parts of a correction that are learned while the loop runs |
 //! | 2 | `region` | which of several modules acts, by operating region |
 //! | 3 | `caps` | bounds of the correction that the application sets |
 //! | 3 | `preview` | the desired trajectory around the present |
@@ -103,6 +104,7 @@ pub mod feedback;
 pub mod format;
 pub mod guard;
 pub mod lanes;
+pub mod learning;
 pub mod math;
 pub mod model;
 pub mod network;

@@ -8,7 +8,7 @@ use std::{
 use impromptu_experiment::demo::{DemoSettings, run};
 use impromptu_firmware::{adapter::Lanes, model::Model};
 use impromptu_report::{Method, Results, Row};
-use impromptu_reproduction::robustness::{CASES, Comparison};
+use impromptu_reproduction::robustness::{CASES, Comparison, handover::hover};
 use impromptu_sim::{condition::Condition, flights::Loop, plant::Vehicle, rollout::FlightPlan, trajectory::strokes};
 use impromptu_tests::{board, golden};
 use impromptu_training::{Purpose, derived, observer::Observer};
@@ -165,6 +165,32 @@ fn the_readme_tells_the_numbers_of_the_demo() {
         }
     }
     assert!(checked >= 24, "the README has a table of the demo");
+}
+
+/// The delay margin that a model states is the one that it is flown with: a hover with the feedback lane alone and no guard, on
+/// seeds of its own, has at most twice the error, and a millimetre more, 10 ms before it, and more 10 ms after it.
+#[test]
+fn stated_delay_margins_are_what_is_flown() {
+    for vehicle in VEHICLES {
+        for condition in ["lab", "rough"] {
+            let file = std::fs::read(models().join(format!("{vehicle}-stock-{condition}-seed1.impromptu"))).expect("a file");
+            let model = Model::from_bytes(&file).expect("a model");
+            let stated = f64::from(model.card().feedback.as_ref().expect("a lane").margins.delay_ms);
+            let condition = Condition::named(condition).expect("a condition");
+            let closed_loop =
+                Loop::new(Vehicle::named(vehicle).expect("a vehicle"), "stock", condition).expect("a loop").unguarded();
+            let hovers = vec![hover(12.0).sampled(closed_loop.rate_hz()).expect("a hover"); 4];
+            let lanes = Lanes { network: false, feedback: true };
+            let error = |milliseconds: f64| {
+                let delayed = closed_loop.delayed(milliseconds * 1e-3);
+                let errors = delayed.errors(&hovers, Some((&model, lanes)), 1.0, 77).expect("flights");
+                errors.iter().sum::<f64>() / errors.len() as f64
+            };
+            let most = 2.0 * error(0.0) + 1e-3;
+            let [before, after] = [stated - 10.0, stated + 10.0].map(|milliseconds| error(milliseconds.max(0.0)));
+            assert!(before <= most && after > most, "{vehicle}, {stated} ms: {before} {after} of {most} m");
+        }
+    }
 }
 
 /// The file that the demo wrote, over one of its test strokes, on the emulated board.

@@ -18,6 +18,7 @@ use impromptu_sim::{
     flight_log::FlightLog,
     flights::{FlightsError, Loop},
     rollout::Dither,
+    trajectory::single_tone,
 };
 use rayon::prelude::*;
 
@@ -289,7 +290,10 @@ pub fn choose_lane(
 ) -> Result<LaneChoice, LaneRefusal> {
     let (candidates, scores) = flown(&recipe.lane, validation, logs, encode)?;
     let admissible = |score: &Score| score.worst >= 0.0;
-    if let Some(choice) = best(&candidates, &scores, &admissible) {
+    if let Some(mut choice) = best(&candidates, &scores, &admissible) {
+        let flown = flown_delay_margin(validation, &encode(&choice.lane)?)?;
+        let margins = &mut choice.lane.margins;
+        margins.delay_ms = margins.delay_ms.min(flown);
         return Ok(choice);
     }
     let (worst, case) = scores
@@ -297,6 +301,40 @@ pub fn choose_lane(
         .max_by(|a, b| a.worst.total_cmp(&b.worst))
         .map_or((f64::NEG_INFINITY, "no design"), |score| (score.worst, score.worst_case));
     Err(LaneRefusal::Flights { designs: candidates.len(), worst, case: case.into() })
+}
+
+/// Hovers that a delay margin is flown in, and how long each is, s.
+const HOVERS: usize = 4;
+const HOVER_S: f64 = 12.0;
+/// Steps of the delay, and the longest, ms.
+const DELAY_STEP: usize = 5;
+const LONGEST_DELAY: usize = 150;
+/// A loop with more delay than its margin hovers with an error of more than this many times that without, and so much more, m.
+const DOUBLED: f64 = 2.0;
+const MORE: f64 = 1e-3;
+
+/// Longest delay of the whole loop, ms, with which a hover with the feedback lane alone, which no guard hands over, has hardly a
+/// larger error than without. Identified margins know what a delay on the lane's own way does: one before the motors takes phase
+/// from the loop within too.
+fn flown_delay_margin(validation: &Validation<'_>, bytes: &[u8]) -> Result<f32, LaneRefusal> {
+    let model = Model::from_bytes(bytes).map_err(ExportError::Refused)?;
+    let lanes = Lanes { network: false, feedback: true };
+    let closed_loop = validation.closed_loop.unguarded();
+    let hover = single_tone(2, 0.0, 1.0, HOVER_S).sampled(closed_loop.rate_hz()).map_err(FlightsError::from)?;
+    let hovers = vec![hover; HOVERS];
+    let error = |milliseconds: usize| -> Result<f64, LaneRefusal> {
+        let delayed = closed_loop.delayed(milliseconds as f64 * 1e-3);
+        let errors = delayed.errors(&hovers, Some((&model, lanes)), 1.0, validation.seed)?;
+        Ok(errors.iter().sum::<f64>() / errors.len() as f64)
+    };
+    let most = DOUBLED * error(0)? + MORE;
+    for milliseconds in (DELAY_STEP..=LONGEST_DELAY).step_by(DELAY_STEP) {
+        let found = error(milliseconds)?;
+        if !found.is_finite() || found > most {
+            return Ok((milliseconds - DELAY_STEP) as f32);
+        }
+    }
+    Ok(LONGEST_DELAY as f32)
 }
 
 /// The design with the best score, admissible or not: the feedback lane of the flatness comparison, for which the clamp

@@ -1,0 +1,127 @@
+//! What a loop makes of a correction of its reference.
+//!
+//! *in* gain, natural frequency, damping and delay, guessed or measured; *out* a recursive filter; *never* an unstable one;
+//! *source* zero-order-hold discretisation of a second-order system (Åström and Wittenmark 1997, Table 2.1).
+
+use crate::math::finite_or_zero;
+
+/// Most ticks of delay.
+pub(super) const MAX_DELAY: usize = 32;
+
+/// A second-order response behind a delay: the measured output at a tick is `gains . (u(t-1-delay), u(t-2-delay))` less
+/// `poles . (y(t-1), y(t-2))`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Response {
+    gains: [f32; 2],
+    poles: [f32; 2],
+    delay: usize,
+}
+
+impl Response {
+    /// Of a system with this gain at rest, natural frequency, rad/s, damping ratio, and delay, s, sampled at a rate, Hz. `None`
+    /// if it is not stable, if it is too fast or too slow for the rate (0.001 to 1 rad a tick), or if the delay is longer than
+    /// 32 ticks.
+    pub fn second_order(gain: f32, frequency: f32, damping: f32, delay_s: f32, rate_hz: f32) -> Option<Self> {
+        let turn = frequency / rate_hz;
+        let delay = delay_s * rate_hz;
+        let known = (1e-3..=1.0).contains(&turn) && (0.05..=5.0).contains(&damping) && (0.0..=MAX_DELAY as f32).contains(&delay);
+        if !(known && gain.abs() > 0.0 && gain.abs() < 1e6) {
+            return None;
+        }
+        let decay = libm::expf(-damping * turn);
+        let square = damping * damping;
+        // cos and sin / (sqrt(1 - d²)) of the damped turn; cosh and sinh beyond critical damping.
+        let (even, odd) = if square < 1.0 {
+            let root = libm::sqrtf((1.0 - square).max(1e-6));
+            (libm::cosf(root * turn), libm::sinf(root * turn) / root)
+        } else {
+            let root = libm::sqrtf((square - 1.0).max(1e-6));
+            (libm::coshf(root * turn), libm::sinhf(root * turn) / root)
+        };
+        let first = gain * (1.0 - decay * (even + damping * odd));
+        let second = gain * (decay * decay + decay * (damping * odd - even));
+        let poles = [-2.0 * decay * even, decay * decay];
+        Some(Self { gains: [first, second], poles, delay: libm::roundf(delay) as usize })
+    }
+
+    /// Change of the output at rest after a correction of 1.
+    pub fn gain(&self) -> f32 {
+        let [first, second] = self.gains;
+        (first + second) / (1.0 + self.poles[0] + self.poles[1])
+    }
+
+    /// Ticks of delay.
+    pub fn delay(&self) -> usize {
+        self.delay
+    }
+}
+
+/// A signal behind a [`Response`].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Filter {
+    input: f32,
+    outputs: [f32; 2],
+}
+
+impl Filter {
+    /// As if the input had been this for long.
+    pub fn at_rest(response: &Response, input: f32) -> Self {
+        Self { input, outputs: [response.gain() * input; 2] }
+    }
+
+    /// The output at a tick; `input` is the one of `1 + delay` ticks before.
+    pub fn step(&mut self, response: &Response, input: f32) -> f32 {
+        let [newer, older] = self.outputs;
+        let output =
+            response.gains[0] * input + response.gains[1] * self.input - response.poles[0] * newer - response.poles[1] * older;
+        (self.input, self.outputs) = (input, [finite_or_zero(output), newer]);
+        self.outputs[0]
+    }
+
+    /// Change from one tick to the next.
+    pub fn change(&self) -> f32 {
+        self.outputs[0] - self.outputs[1]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_answers_a_step_as_the_system_does() {
+        for damping in [0.3f32, 0.7, 1.0, 2.0] {
+            let response = Response::second_order(1.1, 8.0, damping, 0.03, 100.0).unwrap();
+            let mut filter = Filter::default();
+            // The same system in small steps.
+            let (mut x, mut v) = (0.0f64, 0.0f64);
+            for tick in 0..300 {
+                // The reference steps at tick 0; the output sees it one tick and the delay later.
+                let output = filter.step(&response, f32::from(u8::from(tick >= 4)));
+                assert!((f64::from(output) - x).abs() < 2e-3, "{damping}: {output} {x} at {tick}");
+                for _ in 0..100 {
+                    let input = if tick >= 3 { 1.1 } else { 0.0 };
+                    v += 1e-4 * (64.0 * (input - x) - 2.0 * f64::from(damping) * 8.0 * v);
+                    x += 1e-4 * v;
+                }
+            }
+            assert!((response.gain() - 1.1).abs() < 1e-3);
+            assert_eq!(response.delay(), 3);
+        }
+    }
+
+    #[test]
+    fn what_no_loop_has_is_refused() {
+        for (gain, frequency, damping, delay) in [
+            (0.0, 8.0, 0.7, 0.0),
+            (f32::NAN, 8.0, 0.7, 0.0),
+            (1.0, 800.0, 0.7, 0.0),
+            (1.0, f32::INFINITY, 0.7, 0.0),
+            (1.0, 8.0, -0.1, 0.0),
+            (1.0, 8.0, 0.7, 1.0),
+            (1.0, 8.0, 0.7, -0.1),
+        ] {
+            assert_eq!(Response::second_order(gain, frequency, damping, delay, 100.0), None);
+        }
+    }
+}
