@@ -437,9 +437,10 @@ impromptu_status impromptu_adapter_rearm(struct impromptu_adapter *adapter);
 // Both lanes are handed over while it is older than 0.1 s.
 impromptu_status impromptu_adapter_set_age(struct impromptu_adapter *adapter, uint32_t ticks);
 
-// States that measured channels have noise in them, bit `c` of `channels` for channel `c`, so that all of them together are never
-// twice the same but where no new measurement came, for at most `ticks` reference ticks in a row. Once they have been the same
-// for longer, they are as old as that: both lanes are handed over from 0.1 s on. No bit, as from the start: nothing is stated.
+// States that measured channels have noise in them, bit `c` of `channels` for channel `c`, so that all of them together are
+// never twice the same but where no new measurement came, for at most `ticks` reference ticks in a row. Once they have been the
+// same for longer, they are as old as that: both lanes are handed over from 0.1 s on. No bit, as from the start: nothing is
+// stated.
 impromptu_status impromptu_adapter_expect_noise(struct impromptu_adapter *adapter, uint32_t channels, uint32_t ticks);
 
 // States whether the loop moves the machine (not 0): a vehicle on the ground, or a machine that is held, does not follow. Until

@@ -29,7 +29,7 @@ use impromptu_firmware::{
 use nalgebra::{Quaternion, UnitQuaternion, Vector4};
 
 use crate::{
-    course::{self, Course, Now},
+    course::{Course, Now},
     flight::Flight,
     link::{
         Command, Message, Order, Outcome, Reason, Received,
@@ -72,15 +72,6 @@ pub struct Autopilot<'m> {
     /// Mean square of the tracking error over about the last second, m².
     error_square: f32,
     refused: u32,
-}
-
-impl From<course::Refusal> for Reason {
-    fn from(refusal: course::Refusal) -> Self {
-        match refusal {
-            course::Refusal::Braking => Self::Braking,
-            course::Refusal::Tick { expected } => Self::Setpoint { expected },
-        }
-    }
 }
 
 impl Default for Autopilot<'_> {

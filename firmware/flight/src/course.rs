@@ -14,6 +14,7 @@
 
 use crate::{
     flight::{Flight, PREVIEW},
+    link::Reason,
     motion::{Blend, Brake, MotionLimits, between},
     types::Setpoint,
 };
@@ -46,6 +47,15 @@ pub enum Refusal {
         /// The next one that can be taken.
         expected: i32,
     },
+}
+
+impl From<Refusal> for Reason {
+    fn from(refusal: Refusal) -> Self {
+        match refusal {
+            Refusal::Braking => Self::Braking,
+            Refusal::Tick { expected } => Self::Setpoint { expected },
+        }
+    }
 }
 
 /// Where setpoints come from.

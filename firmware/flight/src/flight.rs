@@ -236,8 +236,8 @@ impl<'m> Flight<'m> {
         Vector3::new(x, y, z)
     }
 
-    /// States whether the vehicle is in the air, which a loop that is closed on the ground cannot know: until it is, no lane acts,
-    /// and nothing is integrated or learned, in the position loop too. It is from the start on.
+    /// States whether the vehicle is in the air, which a loop that is closed on the ground cannot know: until it is, no lane
+    /// acts, and nothing is integrated or learned, in the position loop too. It is from the start on.
     pub fn set_airborne(&mut self, airborne: bool) {
         self.grounded = !airborne;
         self.add_on.parts().0.set_airborne(airborne);

@@ -234,8 +234,8 @@ pub struct FeedbackAxis {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Margins {
-    /// Further delay that the loop bears, ms: on the lane's way as designed and, where training had a vehicle to fly, of the whole
-    /// loop, whichever is shorter.
+    /// Further delay that the loop bears, ms: on the lane's way as designed and, where training had a vehicle to fly, of the
+    /// whole loop, whichever is shorter.
     pub delay_ms: f32,
     /// Factor on the loop's gain that it bears.
     pub gain: f32,

@@ -1,12 +1,12 @@
 //! Both learned parts of the correction of one axis.
 //!
 //! *in* the desired trajectory around now, what is measured, its rate of change; *out* the correction; *never* more than the
-//! limits, nor a number that is not finite; *source* ours. Ticks are those of the learner: the loop's response should have settled
-//! after about 80 of them.
+//! limits, nor a number that is not finite; *source* ours. Ticks are those of the learner: the loop's response should have
+//! settled after about 80 of them.
 //!
 //! | part | features | least squares |
 //! |---|---|---|
-//! | preview | the desired trajectory at 12 offsets less the present, and a constant | G features . w = -(e - G c), c all of the correction |
+//! | preview | the desired trajectory at 12 offsets less the present, and a constant | G features . w = G c - e, c all of it |
 //! | feedback | 10 lags of f and f', the error and its derivative as they would be without this part | G features . v = -f |
 //! | | | effort: features . v = 0, a control weight |
 //! | | | margin: (G features - G features of some ticks before) . v = 0: what more delay in the loop would change |

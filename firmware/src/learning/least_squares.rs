@@ -1,8 +1,9 @@
 //! Recursive least squares that stays sound in f32 for days.
 //!
-//! *in* rows `row . x = target` with noise; *out* x; *never* a covariance that is not positive, or that grows: what is forgotten
-//! makes it shrink less; *source* Bierman 1977 (measurement update of P = U D U'), Kulhavý 1987 and Cao and Schwartz 2000 (what is
-//! forgotten is what is known in the direction of the row). What differs: never more is forgotten than is learned.
+//! *in* rows `row . x = target` with noise; *out* x; *never* a covariance that is not positive, or that grows: what is
+//! forgotten makes it shrink less; *source* Bierman 1977 (measurement update of P = U D U'), Kulhavý 1987 and Cao and
+//! Schwartz 2000 (what is forgotten is what is known in the direction of the row). What differs: never more is forgotten than
+//! is learned.
 
 use crate::math::{clamp, finite_or_zero, sqrt};
 

@@ -147,9 +147,10 @@ pub unsafe extern "C" fn impromptu_adapter_set_age(adapter: *mut AdapterMemory, 
     })
 }
 
-/// States that measured channels have noise in them, bit `c` of `channels` for channel `c`, so that all of them together are never
-/// twice the same but where no new measurement came, for at most `ticks` reference ticks in a row. Once they have been the same
-/// for longer, they are as old as that: both lanes are handed over from 0.1 s on. No bit, as from the start: nothing is stated.
+/// States that measured channels have noise in them, bit `c` of `channels` for channel `c`, so that all of them together are
+/// never twice the same but where no new measurement came, for at most `ticks` reference ticks in a row. Once they have been the
+/// same for longer, they are as old as that: both lanes are handed over from 0.1 s on. No bit, as from the start: nothing is
+/// stated.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_adapter_expect_noise(adapter: *mut AdapterMemory, channels: u32, ticks: u32) -> Status {
     report(|| {
