@@ -72,11 +72,15 @@ fn check(bytes: &[u8], float: &FloatNetwork, points: &[Vec<f32>]) -> Vec<(Output
     for (row, pair) in points.windows(2).enumerate() {
         let moves = pair[0].iter().zip(&pair[1]).zip(&float.input_scale).map(|((a, b), scale)| f64::from((a - b).abs() / scale));
         let step = moves.fold(0.0, f64::max);
+        let reach =
+            pair.iter().flat_map(|point| point.iter().zip(&float.input_scale)).map(|(a, scale)| f64::from((a / scale).abs()));
+        let reach = reach.fold(1.0, f64::max);
         for (output, bounds) in bounds.iter().enumerate() {
             let change = (f64::from(exact[row][output]) - f64::from(exact[row + 1][output])).abs();
-            // The float network is evaluated in f32, and adds terms that may be larger than their sum: as large as what inputs of
-            // the order of 1 change it by.
-            let rounding = 1e-5 * f64::from(bounds.magnitude() + bounds.difference + bounds.lipschitz);
+            // The float network is evaluated in f32, and adds terms that may be larger than their sum: as large as what the inputs
+            // change it by.
+            let terms = f64::from(bounds.magnitude() + bounds.difference) + f64::from(bounds.lipschitz) * reach;
+            let rounding = 1e-5 * terms;
             assert!(change <= f64::from(bounds.lipschitz) * step + rounding, "{change} over {step} against {bounds:?}");
         }
     }
