@@ -77,8 +77,8 @@ fn check(bytes: &[u8], float: &FloatNetwork, points: &[Vec<f32>]) -> Vec<(Output
         let reach = reach.fold(1.0, f64::max);
         for (output, bounds) in bounds.iter().enumerate() {
             let change = (f64::from(exact[row][output]) - f64::from(exact[row + 1][output])).abs();
-            // The float network is evaluated in f32, and adds terms that may be larger than their sum: as large as what the inputs
-            // change it by.
+            // The float network is evaluated in f32, and adds terms that may be larger than their sum: as large as what the
+            // inputs change it by.
             let terms = f64::from(bounds.magnitude() + bounds.difference) + f64::from(bounds.lipschitz) * reach;
             let rounding = 1e-5 * terms;
             assert!(change <= f64::from(bounds.lipschitz) * step + rounding, "{change} over {step} against {bounds:?}");
