@@ -8,8 +8,14 @@ use std::{
 use impromptu_experiment::demo::{DemoSettings, run};
 use impromptu_firmware::{adapter::Lanes, model::Model};
 use impromptu_report::{Method, Results, Row};
-use impromptu_reproduction::robustness::{CASES, Comparison, handover::hover};
-use impromptu_sim::{condition::Condition, flights::Loop, plant::Vehicle, rollout::FlightPlan, trajectory::strokes};
+use impromptu_reproduction::robustness::{CASES, Comparison};
+use impromptu_sim::{
+    condition::Condition,
+    flights::Loop,
+    plant::Vehicle,
+    rollout::FlightPlan,
+    trajectory::{hover, strokes},
+};
 use impromptu_tests::{board, golden};
 use impromptu_training::{Purpose, derived, observer::Observer};
 

@@ -10,16 +10,13 @@ use impromptu_firmware::{
     guard::{Trip, Trips},
     model::Model,
 };
-use impromptu_reproduction::robustness::{
-    Change,
-    handover::{hover, windows},
-};
+use impromptu_reproduction::robustness::{Change, handover::windows};
 use impromptu_sim::{
     condition::Condition,
     flights::Loop,
     plant::{GRAVITY, Vehicle},
     rollout::FlightPlan,
-    trajectory::{Motion, Trajectory, by_name, stroke},
+    trajectory::{Motion, Trajectory, by_name, hover, stroke},
 };
 use impromptu_tests::golden;
 

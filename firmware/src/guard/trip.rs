@@ -24,7 +24,7 @@ pub enum Trip {
     Late = 5,
     /// A limit cycle (feedback lane).
     Oscillation = 6,
-    /// The loop tracks worse than it would without the add-on, were its response the nominal one (feedback lane).
+    /// What swings of the error is hardly less than it would be without the lane, which drives it (feedback lane).
     Astray = 7,
 }
 

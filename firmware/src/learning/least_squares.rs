@@ -38,12 +38,6 @@ impl<const N: usize> LeastSquares<N> {
         dot(row, &self.x)
     }
 
-    /// Variance of `row . x`.
-    pub fn variance(&self, row: &[f32; N]) -> f32 {
-        let f = self.rotated(row);
-        self.diagonal.iter().zip(&f).fold(0.0, |sum, (d, f)| sum + d * f * f)
-    }
-
     /// U' row.
     fn rotated(&self, row: &[f32; N]) -> [f32; N] {
         let mut rotated = *row;

@@ -18,7 +18,7 @@ use impromptu_sim::{
     flight_log::FlightLog,
     flights::{FlightsError, Loop},
     rollout::Dither,
-    trajectory::single_tone,
+    trajectory::hover,
 };
 use rayon::prelude::*;
 
@@ -320,8 +320,7 @@ fn flown_delay_margin(validation: &Validation<'_>, bytes: &[u8]) -> Result<f32, 
     let model = Model::from_bytes(bytes).map_err(ExportError::Refused)?;
     let lanes = Lanes { network: false, feedback: true };
     let closed_loop = validation.closed_loop.unguarded();
-    let hover = single_tone(2, 0.0, 1.0, HOVER_S).sampled(closed_loop.rate_hz()).map_err(FlightsError::from)?;
-    let hovers = vec![hover; HOVERS];
+    let hovers = vec![hover(HOVER_S).sampled(closed_loop.rate_hz()).map_err(FlightsError::from)?; HOVERS];
     let error = |milliseconds: usize| -> Result<f64, LaneRefusal> {
         let delayed = closed_loop.delayed(milliseconds as f64 * 1e-3);
         let errors = delayed.errors(&hovers, Some((&model, lanes)), 1.0, validation.seed)?;

@@ -8,7 +8,7 @@ use impromptu_firmware::{guard::Trips, model::Model};
 use impromptu_sim::{
     flights::{FlightsError, Loop},
     rollout::RolloutError,
-    trajectory::{Trajectory, single_tone, stroke},
+    trajectory::{Trajectory, hover, stroke},
 };
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -145,12 +145,6 @@ fn desired(seed: u64, flight: u64, rate_hz: f64) -> Result<Trajectory, FlightsEr
         false => stroke(seed, flight),
     };
     Ok(motion.sampled(rate_hz)?)
-}
-
-/// A hover of at least two seconds.
-#[must_use]
-pub fn hover(seconds: f64) -> impromptu_sim::trajectory::Motion {
-    single_tone(2, 0.0, 1.0, seconds).named("hover")
 }
 
 /// Flies so many flights of each of [`KINDS`], with both lanes and without the add-on. Flights of the same number desire the same

@@ -195,6 +195,15 @@ pub fn single_tone(axis: usize, amplitude: f64, period: f64, duration: f64) -> M
     Motion::new("tone", signal.above_floor())
 }
 
+/// A hover.
+///
+/// # Panics
+/// When it is shorter than two seconds.
+#[must_use]
+pub fn hover(duration: f64) -> Motion {
+    single_tone(2, 0.0, 1.0, duration).named("hover")
+}
+
 fn tone(amplitude: f64, period: f64) -> Tone {
     Tone { amplitude, rate: TAU / period, phase: 0.0 }
 }

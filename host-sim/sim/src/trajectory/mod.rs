@@ -31,7 +31,7 @@ pub mod tones;
 
 pub use catalogue::{by_name, load, read};
 pub use error::TrajectoryError;
-pub use excitation::{MultisineSettings, growing_tones, multisine, single_tone};
+pub use excitation::{MultisineSettings, growing_tones, hover, multisine, single_tone};
 pub use letters::letters;
 pub use motion::{Curve, LEAD_SECONDS, Motion, TAIL_SECONDS};
 pub use names::KNOWN_NAMES;
