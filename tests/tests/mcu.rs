@@ -15,6 +15,10 @@ const GOLDEN: &str = "mcu.txt";
 /// The network that the thresholds are about.
 const ANCHOR: &str = "12-128x4-6";
 
+/// Modelled cycles from flash depend on where the linker puts what, and that, for microflow, on the folder of the checkout.
+const FLASH_COLUMN: usize = 3;
+const PLACEMENT: f64 = 1e-4;
+
 /// The whole benchmark, run once for all tests.
 static RESULTS: LazyLock<Results> = LazyLock::new(|| measure(|_, _| true).expect("the benchmark runs"));
 
@@ -31,7 +35,7 @@ fn the_golden_table_holds() {
         golden::UPDATE_VARIABLE,
         table::text(&RESULTS)
     );
-    golden::compare(GOLDEN, &text).unwrap();
+    golden::compare_within(GOLDEN, &text, FLASH_COLUMN, PLACEMENT).unwrap();
 }
 
 #[test]
@@ -109,9 +113,10 @@ fn the_readme_tells_the_numbers_of_the_benchmark() {
         let cells: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
         let row = row(cells[1], cells[0]);
         let in_ram = row.cycles_ram.map_or("-".to_owned(), |cycles| cycles.to_string());
-        let numbers = [row.instructions, row.cycles_flash].map(|number| number.to_string());
+        let [instructions, cycles] = [row.instructions, row.cycles_flash].map(|number| number.to_string());
         let bytes = [row.flash_bytes, row.ram_bytes].map(|number| number.to_string());
-        let found = [&numbers[0], &numbers[1], &in_ram, &bytes[0], &bytes[1], &format!("{:.1e}", row.max_error)];
+        let cycles = if golden::near(cells[3], &cycles, PLACEMENT) { cells[3] } else { &cycles };
+        let found = [&instructions, cycles, &in_ram, &bytes[0], &bytes[1], &format!("{:.1e}", row.max_error)];
         assert_eq!(cells[2..], found, "{line}");
         checked += 1;
     }
