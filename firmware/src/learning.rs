@@ -9,9 +9,11 @@
 //! of features: so the map is the least squares solution of G(features) . x = -(e - G u).
 
 mod axis;
+mod judge;
 mod least_squares;
 mod response;
+mod ring;
 
-pub use axis::{AHEAD, BEHIND, Learner, Limits, Parts};
-pub use least_squares::LeastSquares;
+pub use axis::{AHEAD, BEHIND, Learned, Learner, Limits, Measured, Parts};
+pub use least_squares::{LeastSquares, above};
 pub use response::{Filter, Response};

@@ -243,6 +243,11 @@ impl<'m> Flight<'m> {
         self.add_on.parts().0.set_airborne(airborne);
     }
 
+    /// Whether it is in the air, as far as was said ([`Flight::set_airborne`]).
+    pub fn airborne(&self) -> bool {
+        !self.grounded
+    }
+
     /// Adds an offset, m, world ENU, to the position reference from the next reference tick on: the independent dither without
     /// which the closed loop cannot be identified. Zero leaves every bit as it is. One that is further than any vehicle flies
     /// changes nothing.

@@ -30,6 +30,7 @@
 //! | 4 | `flight` | the baseline loop with the add-on before it |
 //! | 4 | `link` | messages as bytes which may be lost, damaged or delayed |
 //! | 5 | `course` | the trajectory: gaps, re-plans, braking |
+//! | 5 | `learning` | corrections that are learned while it flies |
 //! | 5 | `replay` | recorded flights, and how they are flown again |
 //! | 6 | `autopilot` | arming, and what happens when nothing arrives any more |
 //! | 7 | `application` | the autopilot behind its serial line |
@@ -45,6 +46,7 @@ pub mod caps;
 pub mod control;
 pub mod course;
 pub mod flight;
+pub mod learning;
 pub mod link;
 pub mod motion;
 pub mod quadrotor;

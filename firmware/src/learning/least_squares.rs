@@ -10,22 +10,30 @@ use crate::math::{clamp, finite_or_zero, sqrt};
 /// A row surprises by at most this many standard deviations: what is more is an outlier, and counts as that.
 const GATE: f32 = 4.0;
 
-/// `N` unknowns.
+/// `N` unknowns; `ABOVE` is the number of entries above the diagonal of an N by N matrix, [`above`]`(N)`.
 #[derive(Clone, Debug)]
-pub struct LeastSquares<const N: usize> {
+pub struct LeastSquares<const N: usize, const ABOVE: usize> {
     x: [f32; N],
-    /// `upper[i][j]` above the diagonal; the diagonal is 1.
-    upper: [[f32; N]; N],
+    /// What of U is above its diagonal, column after column; the diagonal is 1.
+    upper: [f32; ABOVE],
     diagonal: [f32; N],
     /// Variances before anything was seen.
     prior: [f32; N],
 }
 
-impl<const N: usize> LeastSquares<N> {
+/// Entries above the diagonal of a square matrix with so many columns.
+pub const fn above(columns: usize) -> usize {
+    columns * columns.saturating_sub(1) / 2
+}
+
+impl<const N: usize, const ABOVE: usize> LeastSquares<N, ABOVE> {
+    const FITS: () = assert!(ABOVE == above(N), "ABOVE is not above(N)");
+
     /// Unknowns around 0, with these standard deviations.
     pub fn new(prior: &[f32; N]) -> Self {
+        let () = Self::FITS;
         let prior = prior.map(|sigma| sigma * sigma);
-        Self { x: [0.0; N], upper: [[0.0; N]; N], diagonal: prior, prior }
+        Self { x: [0.0; N], upper: [0.0; ABOVE], diagonal: prior, prior }
     }
 
     /// The unknowns.
@@ -41,9 +49,12 @@ impl<const N: usize> LeastSquares<N> {
     /// U' row.
     fn rotated(&self, row: &[f32; N]) -> [f32; N] {
         let mut rotated = *row;
+        let mut upper = self.upper.as_slice();
         for (j, value) in rotated.iter_mut().enumerate() {
-            for (upper, row) in self.upper.iter().zip(row).take(j) {
-                *value += upper[j] * row;
+            let (column, rest) = upper.split_at_checked(j).unwrap_or_default();
+            upper = rest;
+            for (upper, row) in column.iter().zip(row) {
+                *value += upper * row;
             }
         }
         rotated
@@ -71,14 +82,16 @@ impl<const N: usize> LeastSquares<N> {
         let noise = if left > 0.0 { growth * variance * noise / left } else { f32::MAX };
         let mut gain = [0.0; N];
         let mut before = noise;
+        let mut upper = self.upper.as_mut_slice();
         for (j, (diagonal, f)) in self.diagonal.iter_mut().zip(&f).enumerate() {
             let g = *diagonal * f;
             let after = before + f * g;
             let (ratio, lambda) = (before / after, -f / before);
             *diagonal *= ratio;
+            let (column, columns) = core::mem::take(&mut upper).split_at_mut_checked(j).unwrap_or_default();
+            upper = columns;
             let (sums, rest) = gain.split_at_mut(j);
-            for (upper, sum) in self.upper.iter_mut().zip(sums) {
-                let Some(upper) = upper.get_mut(j) else { continue };
+            for (upper, sum) in column.iter_mut().zip(sums) {
                 let old = *upper;
                 *upper = finite_or_zero(old + *sum * lambda);
                 *sum += old * g;
@@ -95,7 +108,7 @@ impl<const N: usize> LeastSquares<N> {
 
     /// Back to the prior.
     pub fn reset(&mut self) {
-        (self.x, self.upper, self.diagonal) = ([0.0; N], [[0.0; N]; N], self.prior);
+        (self.x, self.upper, self.diagonal) = ([0.0; N], [0.0; ABOVE], self.prior);
     }
 }
 
@@ -105,14 +118,22 @@ fn dot<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use std::cmp::Ordering;
+
     use super::*;
     use proptest::prelude::*;
 
     const N: usize = 4;
 
+    type Four = LeastSquares<N, { above(N) }>;
+
     /// P = U D U'.
-    fn covariance(found: &LeastSquares<N>) -> [[f32; N]; N] {
-        let upper = |i: usize, j: usize| if i == j { 1.0 } else { found.upper[i][j] };
+    fn covariance(found: &Four) -> [[f32; N]; N] {
+        let upper = |i: usize, j: usize| match i.cmp(&j) {
+            Ordering::Less => found.upper[above(j) + i],
+            Ordering::Equal => 1.0,
+            Ordering::Greater => 0.0,
+        };
         core::array::from_fn(|a| core::array::from_fn(|b| (0..N).map(|j| upper(a, j) * found.diagonal[j] * upper(b, j)).sum()))
     }
 
@@ -124,7 +145,7 @@ mod tests {
 
     #[test]
     fn it_finds_what_made_the_targets() {
-        let (mut found, mut seed, truth) = (LeastSquares::<N>::new(&[1.0; N]), 1, [0.3, -0.7, 0.1, 0.9]);
+        let (mut found, mut seed, truth) = (Four::new(&[1.0; N]), 1, [0.3, -0.7, 0.1, 0.9]);
         for _ in 0..2000 {
             let row = [(); N].map(|()| draw(&mut seed));
             found.learn(&row, dot(&row, &truth) + 0.01 * draw(&mut seed), 0.01, 0.0);
@@ -136,7 +157,7 @@ mod tests {
 
     #[test]
     fn an_outlier_moves_little_and_a_minute_without_excitation_nothing() {
-        let (mut found, mut seed, truth) = (LeastSquares::<N>::new(&[1.0; N]), 1, [0.3, -0.7, 0.1, 0.9]);
+        let (mut found, mut seed, truth) = (Four::new(&[1.0; N]), 1, [0.3, -0.7, 0.1, 0.9]);
         for _ in 0..2000 {
             let row = [(); N].map(|()| draw(&mut seed));
             found.learn(&row, dot(&row, &truth), 0.01, 1e-3);
@@ -154,8 +175,8 @@ mod tests {
 
     #[test]
     fn what_is_excited_is_followed_and_the_rest_kept() {
-        let (mut found, mut seed) = (LeastSquares::<N>::new(&[1.0; N]), 1);
-        let mut teach = |found: &mut LeastSquares<N>, truth: [f32; N], excited: usize, rows: usize| {
+        let (mut found, mut seed) = (Four::new(&[1.0; N]), 1);
+        let mut teach = |found: &mut Four, truth: [f32; N], excited: usize, rows: usize| {
             for _ in 0..rows {
                 let row = core::array::from_fn(|i| if i < excited { draw(&mut seed) } else { 0.0 });
                 found.learn(&row, dot(&row, &truth), 0.01, 5e-3);
@@ -176,7 +197,7 @@ mod tests {
             seed in any::<u32>(), scale in -6f32..3.0, sigma in 1e-4f32..1.0, share in 0f32..0.1,
             odd in prop::collection::vec(any::<[f32; 5]>(), 0..8)
         ) {
-            let (mut found, mut seed, scale) = (LeastSquares::<N>::new(&[1.0; N]), seed, libm::powf(10.0, scale));
+            let (mut found, mut seed, scale) = (Four::new(&[1.0; N]), seed, libm::powf(10.0, scale));
             for step in 0..3000usize {
                 let (row, target) = match odd.get(step / 40) {
                     Some([a, b, c, d, target]) if step % 40 == 0 => ([*a, *b, *c, *d], *target),

@@ -15,6 +15,8 @@ pub struct Response {
     gains: [f32; 2],
     poles: [f32; 2],
     delay: usize,
+    /// Of the natural frequency, rad a tick.
+    turn: f32,
 }
 
 impl Response {
@@ -41,13 +43,18 @@ impl Response {
         let first = gain * (1.0 - decay * (even + damping * odd));
         let second = gain * (decay * decay + decay * (damping * odd - even));
         let poles = [-2.0 * decay * even, decay * decay];
-        Some(Self { gains: [first, second], poles, delay: libm::roundf(delay) as usize })
+        Some(Self { gains: [first, second], poles, delay: libm::roundf(delay) as usize, turn })
     }
 
     /// Change of the output at rest after a correction of 1.
     pub fn gain(&self) -> f32 {
         let [first, second] = self.gains;
         (first + second) / (1.0 + self.poles[0] + self.poles[1])
+    }
+
+    /// Natural frequency, rad a tick.
+    pub fn turn(&self) -> f32 {
+        self.turn
     }
 
     /// Ticks of delay.

@@ -3,12 +3,12 @@
 //! *in* unseen smooth motions; *out* the error that is left; *never* a model; *source* the servo of the pilot of learning in
 //! flight: PD behind a delay, viscous and Coulomb friction, a slow random disturbance.
 
-use impromptu_firmware::learning::{Learner, Limits, Parts, Response};
+use impromptu_firmware::learning::{Learner, Limits, Measured, Parts, Response};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 const HZ: usize = 100;
-const LIMITS: Limits = Limits { correction: 0.5, feedback: 0.3 };
+const LIMITS: Limits = Limits { scale: 1.0, correction: 1.0, feedback: 0.3, rate: 40.0 };
 
 struct Servo {
     random: Xoshiro256PlusPlus,
@@ -89,7 +89,7 @@ fn fly_on(mut servo: Servo, desired: &[f64], learner: Option<&mut Learner>, lear
         let (angle, speed) = servo.measured();
         let around = |offset: i32| desired[(tick as i32 + offset).clamp(0, desired.len() as i32 - 1) as usize] as f32;
         let correction = match &mut learner {
-            Some(learner) => learner.step(around, angle, speed, learn, act, &LIMITS),
+            Some(learner) => learner.step(around, Some(Measured { value: angle, rate: speed }), learn, act),
             None => 0.0,
         };
         servo.run(goal + f64::from(correction));
@@ -99,7 +99,7 @@ fn fly_on(mut servo: Servo, desired: &[f64], learner: Option<&mut Learner>, lear
 
 /// Reductions, %, of 30 strokes one after another; the feedback part joins from the second on.
 fn reductions(response: Response) -> Vec<f64> {
-    let mut learner = Learner::new(response, HZ as f32, 0.0);
+    let mut learner = Learner::new(response, HZ as f32, 0.0, LIMITS).unwrap();
     (0..30)
         .map(|stroke| {
             let desired = motion(100 + stroke, 18);
@@ -112,7 +112,7 @@ fn reductions(response: Response) -> Vec<f64> {
 }
 
 fn guessed() -> Learner {
-    Learner::new(Response::second_order(1.0, 7.75, 0.71, 0.02, HZ as f32).unwrap(), HZ as f32, 0.0)
+    Learner::new(Response::second_order(1.0, 7.75, 0.71, 0.02, HZ as f32).unwrap(), HZ as f32, 0.0, LIMITS).unwrap()
 }
 
 #[test]
@@ -147,22 +147,24 @@ fn a_loop_that_sags_is_followed() {
     });
     let (learns, stays) = (left(29, &mut learner, Parts::BOTH), left(29, &mut frozen, Parts::NONE));
     println!("a gain of 0.71: learning on {learns:.1} %, not {stays:.1} %");
-    assert!(learns > 92.0 && learns > stays + 5.0, "{learns} {stays}");
+    assert!(learns > 97.0 && 100.0 - learns < 0.7 * (100.0 - stays), "{learns} {stays}");
 }
 
 #[test]
 fn a_servo_learns_from_nothing_and_from_a_response_that_is_wrong() {
-    for (name, gain, frequency, delay, asked) in [
-        ("as guessed from its gains", 1.0, 7.75, 0.02, [93.0, 60.0]),
-        ("gain x2", 2.0, 7.75, 0.02, [92.0, 60.0]),
-        ("100 ms later", 1.0, 7.75, 0.12, [92.0, 60.0]),
-        ("half as fast", 1.0, 3.9, 0.02, [92.0, 60.0]),
+    let mut guessed = None;
+    for (name, gain, frequency, delay) in [
+        ("as guessed from its gains", 1.0, 7.75, 0.02),
+        ("gain x2", 2.0, 7.75, 0.02),
+        ("100 ms later", 1.0, 7.75, 0.12),
+        ("half as fast", 1.0, 3.9, 0.02),
     ] {
         let response = Response::second_order(gain, frequency, 0.71, delay, HZ as f32).unwrap();
         let found = reductions(response);
         let later = &found[4..];
         let (mean, worst) = (later.iter().sum::<f64>() / later.len() as f64, later.iter().copied().fold(f64::MAX, f64::min));
         println!("{name}: first strokes {:.1?}, from the fifth on {mean:.1} / {worst:.1} %", &found[..4]);
-        assert!(mean >= asked[0] && worst >= asked[1], "{name}: {mean} / {worst}");
+        let guessed = *guessed.get_or_insert(mean);
+        assert!(mean >= 97.0 && worst >= 85.0 && mean >= guessed - 3.0, "{name}: {mean} / {worst}");
     }
 }

@@ -1,7 +1,10 @@
 //! The flights of an experiment: one vehicle with its gains under one condition.
 
 use impromptu_firmware::{adapter::Lanes, guard::GuardSettings, model::Model};
-use impromptu_flight::flight::Settings;
+use impromptu_flight::{
+    flight::Settings,
+    learning::{FlightLearning, Guess},
+};
 
 use crate::{
     condition::Condition,
@@ -75,6 +78,26 @@ impl Loop {
     /// The first plan that cannot be flown.
     pub fn fly(&self, plans: &[FlightPlan<'_>]) -> Result<Vec<FlightRecord>, RolloutError> {
         rollout::fly(&self.vehicle, &self.settings, &self.condition, plans)
+    }
+
+    /// Learns beside its flights, from nothing and with a guess of its response from its gains.
+    ///
+    /// # Errors
+    /// If the gains are not those of a loop of second order.
+    pub fn learning(&self) -> Result<FlightLearning, RolloutError> {
+        let (age, rate) = (self.condition.measurement_delay_s as f32, self.rate_hz() as f32);
+        let guesses = Guess::of(&self.settings, age);
+        guesses.and_then(|guesses| FlightLearning::new(&guesses, rate, age)).ok_or_else(|| {
+            RolloutError::Airframe(format!("gains `{}`: no loop of second order, whose response could be guessed", self.gains))
+        })
+    }
+
+    /// Flies a plan while it learns; what was learned before is known.
+    ///
+    /// # Errors
+    /// If it cannot be flown.
+    pub fn fly_learning(&self, plan: &FlightPlan<'_>, learning: &mut FlightLearning) -> Result<FlightRecord, RolloutError> {
+        rollout::fly_learning(&self.vehicle, &self.settings, &self.condition, plan, learning)
     }
 
     /// Logs of the baseline over motions, with a dither on the position reference if given.

@@ -9,7 +9,10 @@ mod pilot;
 mod plan;
 mod stack;
 
-use impromptu_flight::flight::{Rates, Settings};
+use impromptu_flight::{
+    flight::{Rates, Settings},
+    learning::FlightLearning,
+};
 #[cfg(feature = "threads")]
 use rayon::prelude::*;
 
@@ -56,6 +59,22 @@ pub fn fly(
         records[index] = record;
     }
     Ok(records)
+}
+
+/// Flies one plan with a flight stack that learns: it knows what it learned before, and more afterwards. What it learns comes in
+/// the place of a dither.
+///
+/// # Errors
+/// If the plan cannot be flown.
+pub fn fly_learning(
+    vehicle: &Vehicle,
+    settings: &Settings,
+    condition: &Condition,
+    plan: &FlightPlan<'_>,
+    learning: &mut FlightLearning,
+) -> Result<FlightRecord, RolloutError> {
+    let stack = Software::new(vehicle, settings, condition, plan)?.learning(learning);
+    fly_on(stack, vehicle, settings, condition, plan)
 }
 
 /// Flies one plan with a flight stack of its own: the same flight as [`fly`]'s, to the bit, if the stack gives the same bits.

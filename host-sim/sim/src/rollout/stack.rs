@@ -6,6 +6,7 @@
 use impromptu_firmware::{guard::Trips, network::Scratch};
 use impromptu_flight::{
     flight::{Flight, Settings},
+    learning::FlightLearning,
     types::{MotorCommand, Reference, Setpoint, State, Tick},
 };
 use nalgebra::Vector3;
@@ -62,6 +63,7 @@ impl<S: FlightStack> FlightStack for &mut S {
 pub(super) struct Software<'a> {
     inside: FaultyFlight<'a>,
     scratch: Scratch,
+    learning: Option<&'a mut FlightLearning>,
 }
 
 impl<'a> Software<'a> {
@@ -81,7 +83,15 @@ impl<'a> Software<'a> {
             }
         }
         let delay = condition.command_delay_ticks(settings.rates.control_hz.into());
-        Ok(Self { inside: FaultyFlight::new(flight, plan.loop_gain, delay), scratch: Scratch::new() })
+        Ok(Self { inside: FaultyFlight::new(flight, plan.loop_gain, delay), scratch: Scratch::new(), learning: None })
+    }
+}
+
+impl<'a> Software<'a> {
+    /// The same, which learns what it does not know yet.
+    pub(super) fn learning(self, learning: &'a mut FlightLearning) -> Self {
+        learning.restart();
+        Self { learning: Some(learning), ..self }
     }
 }
 
@@ -99,6 +109,9 @@ impl FlightStack for Software<'_> {
     }
 
     fn step(&mut self, tick: Tick, state: &State) -> MotorCommand {
+        if let Some(learning) = &mut self.learning {
+            learning.step(&mut self.inside.flight, tick, state);
+        }
         self.inside.step(tick, state, &mut self.scratch)
     }
 

@@ -1,0 +1,138 @@
+//! What a flight stack learns while it flies: corrections of its position references, from nothing.
+//!
+//! *in* a flight stack before each control tick, and the state that it will get; *out* the offset of its position reference;
+//! *never* more than the limits; *source* [`impromptu_firmware::learning`], one learner an axis of the world frame, ENU.
+//!
+//! The learner knows nothing of what flies: the loop, with or without a model before it, is what the position reference goes
+//! into. Its response may be a guess ([`Guess`]).
+
+use impromptu_firmware::{
+    learning::{AHEAD, BEHIND, Learned, Learner, Limits, Measured, Parts, Response},
+    math::sqrt,
+};
+use nalgebra::Vector3;
+
+use crate::{
+    caps,
+    flight::{Flight, Settings},
+    types::{State, Tick},
+};
+
+/// Acceleration that the loop is asked for by a correction in a calm flight, m/s².
+const ACCELERATION: f32 = 6.5;
+/// What the feedback part has of it.
+const FEEDBACK: f32 = 0.3;
+/// Time in which a correction may go from nothing to its limit, s.
+const RISE: f32 = 0.05;
+/// From the position loop's command to the vehicle's acceleration, s: an attitude loop of 20 rad/s.
+const ATTITUDE: f32 = 0.055;
+
+/// What is known of an axis: how its loop answers, and what a correction may be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Guess {
+    /// Position reference to measured position.
+    pub response: Response,
+    /// Bounds of the correction, m and m/s.
+    pub limits: Limits,
+}
+
+impl Guess {
+    /// Of each axis, as the gains of the position loop say; positions are `age_s` old when they arrive. `None` if they are not
+    /// those of a loop of second order.
+    pub fn of(settings: &Settings, age_s: f32) -> Option<[Self; 3]> {
+        let of = |kp: f32, kd: f32| {
+            let (frequency, rate) = (sqrt(kp), settings.rates.reference_hz());
+            let response = Response::second_order(1.0, frequency, 0.5 * kd / frequency, age_s + ATTITUDE, rate)?;
+            let (scale, correction) = (ACCELERATION / kp, caps::ACCELERATION / kp);
+            let limits = Limits { scale, correction, feedback: FEEDBACK * scale, rate: correction / RISE };
+            Some(Self { response, limits })
+        };
+        let ([px, py, pz], [dx, dy, dz]) = (settings.position.kp, settings.position.kd);
+        Some([of(px, dx)?, of(py, dy)?, of(pz, dz)?])
+    }
+}
+
+/// Learns beside a flight stack.
+#[derive(Clone, Debug)]
+pub struct FlightLearning {
+    axes: [Learner; 3],
+    /// Parts that learn, and parts that act.
+    learn: Parts,
+    act: Parts,
+    /// Reference tick of the last correction.
+    last: Option<i32>,
+    offset: Vector3<f32>,
+}
+
+impl FlightLearning {
+    /// Nothing learned yet; both parts learn and act. `rate_hz` is the rate of the references, `age_s` the age of a position when
+    /// it arrives. `None` if a limit is not a positive number.
+    pub fn new(guesses: &[Guess; 3], rate_hz: f32, age_s: f32) -> Option<Self> {
+        let learner = |guess: &Guess| Learner::new(guess.response, rate_hz, age_s, guess.limits);
+        let [x, y, z] = guesses;
+        let axes = [learner(x)?, learner(y)?, learner(z)?];
+        Some(Self { axes, learn: Parts::BOTH, act: Parts::BOTH, last: None, offset: Vector3::zeros() })
+    }
+
+    /// Which parts learn, and which act.
+    pub fn switch(&mut self, learn: Parts, act: Parts) {
+        (self.learn, self.act) = (learn, act);
+    }
+
+    /// Another flight: what was learned stays.
+    pub fn restart(&mut self) {
+        (self.last, self.offset) = (None, Vector3::zeros());
+    }
+
+    /// Forgets what was learned.
+    pub fn forget(&mut self) {
+        self.axes.iter_mut().for_each(Learner::forget);
+    }
+
+    /// What was learned of each axis.
+    pub fn learned(&self) -> [Learned; 3] {
+        let [x, y, z] = &self.axes;
+        [x.learned(), y.learned(), z.learned()]
+    }
+
+    /// How often what was learned was forgotten because it did harm.
+    pub fn forgotten(&self) -> u16 {
+        self.axes.iter().fold(0, |sum, axis| sum.saturating_add(axis.forgotten()))
+    }
+
+    /// The share of the correction that acts, 0..1, of the axis with the least.
+    pub fn share(&self) -> f32 {
+        self.axes.iter().fold(1.0, |least, axis| axis.share().min(least))
+    }
+
+    /// Before a control tick of the flight stack, with the state that it will get: at a reference tick the offset of its position
+    /// reference, which it gets in the place of a dither. A state that no vehicle can be in is a missing sample. On the ground,
+    /// and after a gap, it begins anew at rest.
+    pub fn step(&mut self, flight: &mut Flight<'_>, tick: Tick, state: &State) -> Vector3<f32> {
+        let now = flight.reference_tick(tick);
+        if self.last == Some(now) {
+            return self.offset;
+        }
+        let goes_on = self.last.is_some_and(|last| last.wrapping_add(1) == now) && flight.airborne();
+        self.last = Some(now);
+        let known = state.is_physical();
+        // One row of the window at a time: ten channels of a setpoint hold three positions.
+        for (axis, learner) in self.axes.iter_mut().enumerate() {
+            let desired = |offset: i32| {
+                let tick = now.wrapping_add(offset.clamp(-BEHIND - 1, AHEAD));
+                flight.setpoint(tick).position.get(axis).copied().unwrap_or(0.0)
+            };
+            let [value, rate] = [state.position, state.velocity].map(|vector| vector.get(axis).copied().unwrap_or(0.0));
+            let measured = known.then_some(Measured { value, rate });
+            if !goes_on {
+                learner.start(desired(0));
+            }
+            let correction = learner.step(desired, measured, self.learn, self.act);
+            if let Some(offset) = self.offset.get_mut(axis) {
+                *offset = if flight.airborne() { correction } else { 0.0 };
+            }
+        }
+        flight.set_dither(self.offset);
+        self.offset
+    }
+}
