@@ -11,10 +11,12 @@
 //! | 1 | `siso` | the add-on on small loops: laws, samples, a network by Levenberg-Marquardt, deployment |
 //! | 2 | `lti`, `extensions` | linear systems; what the paper leaves to later work |
 //! | 2 | `quadrotor`, `robustness` | the quadrotor; other vehicles, loops and air |
+//! | 3 | `learning` | what is learned in flight, also where `robustness` found a loss |
 
 #[cfg(test)]
 mod checks;
 pub mod extensions;
+pub mod learning;
 pub mod lti;
 pub mod quadrotor;
 pub mod robustness;

@@ -1,6 +1,7 @@
 //! `host-sim study`: the paper, row by row.
 
 mod found;
+mod learning;
 mod robustness;
 
 use anyhow::Result;
@@ -32,6 +33,8 @@ enum Subject {
     },
     /// What is left of the gain when vehicle, loop and air are not those of the training.
     Robustness(robustness::Robustness),
+    /// What a loop learns while it flies, from nothing or on top of a model that was made for another one.
+    Learning(learning::Learning),
     /// The Monte Carlo run over vehicles by itself, or a part of it.
     Draws(robustness::Draws),
     /// Puts the parts of a Monte Carlo run together.
@@ -49,6 +52,7 @@ impl Study {
                 show(invocation, "quadrotor", &found)
             }
             Subject::Robustness(command) => command.run(invocation),
+            Subject::Learning(command) => command.run(invocation),
             Subject::Draws(command) => command.run(invocation),
             Subject::Merge(command) => command.run(invocation),
         }

@@ -7,6 +7,7 @@ use impromptu_report::{
     study::{Finding, Study},
     write_page,
 };
+use serde::Serialize;
 
 use crate::cli::{
     Invocation,
@@ -15,11 +16,16 @@ use crate::cli::{
 
 /// Writes the page into the folder as `study-NAME.html` and prints what was found.
 pub(super) fn show(invocation: &Invocation, name: &str, study: &Study) -> Result<()> {
+    show_as(invocation, name, study, study)
+}
+
+/// The same, with a JSON document that holds more than the study.
+pub(super) fn show_as(invocation: &Invocation, name: &str, study: &Study, document: &impl Serialize) -> Result<()> {
     let path = invocation.configuration.folder()?.join(format!("study-{name}.html"));
     invocation.check_output(&path, [])?;
     write_page(&render_study(study)?, &path)?;
     invocation.console.note(&format!("report: {}", path.display()));
-    invocation.format.print(study, || text(&study.harmless()))
+    invocation.format.print(document, || text(&study.harmless()))
 }
 
 /// Section by section: its tables, then what stands in none.

@@ -1,0 +1,92 @@
+//! Learning in flight: what a loop makes of its error while it flies, from nothing or on top of a model that was made for another
+//! one.
+//!
+//! *in* settings; *out* rows and a [`Study`]; *never* a flight whose motion was learned from before, but where strokes are flown
+//! one after another and each is judged as it is flown; *source* ours: least squares on the responses to features, in the manner
+//! of Widrow and Walach 1996 (filtered-x) and Pereida, Helwa, Schoellig 2018 (a learned map that corrects references).
+
+mod cases;
+mod flown;
+mod melting;
+mod report;
+mod row;
+
+use std::collections::BTreeMap;
+
+use anyhow::Context as _;
+use impromptu_firmware::model::Model;
+use impromptu_report::study::Study;
+use impromptu_sim::{flights::Loop, trajectory::strokes};
+use impromptu_training::{Purpose, Recipe, build, derived, observer::Observer};
+use rayon::prelude::*;
+
+pub use cases::{Case, Start, cases};
+pub use flown::{Learned, after, one_after_another};
+pub use row::{Row, Seconds};
+
+/// What the study covers.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Test strokes of each row.
+    pub strokes: usize,
+    /// How models are trained, for the rows that start with one.
+    pub recipe: Recipe,
+    /// Whether rows that start with a model are flown, for which models are trained.
+    pub models: bool,
+}
+
+/// Rows of the study, and the study that shows them.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// One row for each case.
+    pub rows: Vec<Row>,
+    /// The same for people.
+    pub study: Study,
+}
+
+/// Runs the study.
+///
+/// # Errors
+/// If a model cannot be built or a stroke not be flown.
+pub fn run(settings: &Settings, command: &str, observer: &dyn Observer) -> anyhow::Result<Found> {
+    let all: Vec<Case> = cases().into_iter().filter(|case| settings.models || case.start == Start::Nothing).collect();
+    let models = models(settings, &all, observer)?;
+    observer.stage(&format!("{} rows of {} strokes", all.len(), settings.strokes));
+    let rows = all.par_iter().map(|case| fly(settings, case, &models)).collect::<anyhow::Result<Vec<Row>>>()?;
+    let mut study = Study::new("Learning in flight", command, settings.seed);
+    report::tell(&mut study, settings, &all, &rows);
+    observer.stage("the first minute");
+    study.figures.push(melting::figure(settings)?);
+    Ok(Found { rows, study })
+}
+
+/// Files of the models that the cases start with, by the loop that they were made for.
+fn models(settings: &Settings, all: &[Case], observer: &dyn Observer) -> anyhow::Result<BTreeMap<String, Vec<u8>>> {
+    let mut models = BTreeMap::new();
+    for case in all.iter().filter_map(Case::made_for) {
+        let (name, closed_loop) = case?;
+        if !models.contains_key(&name) {
+            observer.stage(&format!("{name}: building the model"));
+            models.insert(name, build(&settings.recipe, &closed_loop, settings.seed, &mut |_| {})?.models.int8);
+        }
+    }
+    Ok(models)
+}
+
+fn fly(settings: &Settings, case: &Case, models: &BTreeMap<String, Vec<u8>>) -> anyhow::Result<Row> {
+    let closed_loop: Loop = case.closed_loop()?;
+    let bytes = case.made_for().transpose()?.and_then(|(name, _)| models.get(&name));
+    let model = bytes.map(|bytes| Model::from_bytes(bytes)).transpose()?;
+    let seed = derived(settings.seed, Purpose::Test);
+    let rate = closed_loop.rate_hz();
+    let test = strokes(seed, settings.strokes, case.speed, rate)?;
+    let teach = strokes(derived(settings.seed, Purpose::Training), 12, case.speed, rate)?;
+    let learned = Learned { closed_loop: &closed_loop, model: model.as_ref(), parts: case.parts, seed };
+    let flown = match case.seconds {
+        Seconds::FromFirstStroke => one_after_another(&learned, &test, case.then_later_s),
+        Seconds::After(seconds) => after(&learned, seconds, &teach, &test),
+    };
+    Ok(Row::new(case, settings.seed, &flown.with_context(|| case.name())?))
+}
