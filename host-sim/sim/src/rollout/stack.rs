@@ -12,9 +12,10 @@ use nalgebra::Vector3;
 
 use super::{
     faults::FaultyFlight,
+    loops::Loops,
     plan::{FlightPlan, RolloutError},
 };
-use crate::{condition::Condition, plant::Vehicle};
+use crate::{condition::Condition, controller::Controller, plant::Vehicle};
 
 /// A flight stack, on the ground or in flight.
 pub trait FlightStack {
@@ -67,10 +68,12 @@ pub(super) struct Software<'a> {
 impl<'a> Software<'a> {
     pub(super) fn new(
         vehicle: &Vehicle,
+        controller: Controller,
         settings: &Settings,
         condition: &Condition,
         plan: &FlightPlan<'a>,
     ) -> Result<Self, RolloutError> {
+        controller.check(vehicle)?;
         settings.check().map_err(|refusal| RolloutError::Airframe(format!("`{}`: {refusal}", vehicle.name)))?;
         let mut flight = Flight::empty();
         flight.configure(settings);
@@ -81,7 +84,8 @@ impl<'a> Software<'a> {
             }
         }
         let delay = condition.command_delay_ticks(settings.rates.control_hz.into());
-        Ok(Self { inside: FaultyFlight::new(flight, plan.loop_gain, delay), scratch: Scratch::new() })
+        let loops = Loops::new(controller, vehicle, &settings.rates, delay);
+        Ok(Self { inside: FaultyFlight::with(flight, plan.loop_gain, loops), scratch: Scratch::new() })
     }
 }
 
