@@ -65,6 +65,11 @@ struct Evaluation {
 }
 
 impl Evaluate {
+    /// Why the arguments do not go together, if they do not.
+    pub(super) fn conflict(&self) -> Option<String> {
+        self.situation.conflict()
+    }
+
     pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
         let closed_loop = self.situation.closed_loop()?.delayed(self.extra_delay_ms / 1e3);
         let seed = invocation.configuration.seed();

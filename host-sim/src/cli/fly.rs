@@ -16,6 +16,7 @@ use impromptu_firmware::{
 use impromptu_pil::LinkKind;
 use impromptu_report::{Method, PerFlight};
 use impromptu_sim::{
+    controller::Controller,
     rollout::{FlightPlan, FlightRecord},
     trajectory::strokes,
 };
@@ -41,6 +42,7 @@ Examples:
   host-sim fly --trajectory figure8
   host-sim fly --model models/model.impromptu --trajectory letters:HI --speed 1.7 --log hi.csv
   host-sim fly --model models/model.impromptu --trajectory own.csv --condition rough --extra-delay-ms 20 --lanes network
+  host-sim fly --trajectory figure8 --controller pid
   host-sim fly --pil --model models/model.impromptu")]
 pub(super) struct Fly {
     /// Model file; without it the baseline flies alone.
@@ -129,6 +131,14 @@ impl Tripped {
 }
 
 impl Fly {
+    /// Why the arguments do not go together, if they do not.
+    pub(super) fn conflict(&self) -> Option<String> {
+        let controller = self.situation.controller;
+        let elsewhere = self.pil && controller != Controller::Se3;
+        let reason = || format!("--pil: the firmware flies its own loop, se3; leave out --controller {}", controller.name());
+        elsewhere.then(reason).or_else(|| self.situation.conflict())
+    }
+
     pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
         if let Some(log) = &self.log {
             let inputs = self.model.as_deref().into_iter().chain(self.trajectory.as_deref().map(Path::new));
