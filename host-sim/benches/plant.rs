@@ -56,7 +56,9 @@ fn closed_loop(criterion: &mut Criterion) {
     group.throughput(Throughput::Elements((plans.len() * trajectory.samples.len() * 5) as u64));
     group.sample_size(20);
     group.bench_function("500 Hz steps on one core", |bencher| {
-        bencher.iter(|| pool.install(|| rollout::fly(&vehicle, Controller::Se3, &settings, &condition, black_box(&plans)).expect("flights")));
+        bencher.iter(|| {
+            pool.install(|| rollout::fly(&vehicle, Controller::Se3, &settings, &condition, black_box(&plans)).expect("flights"))
+        });
     });
     group.finish();
 }

@@ -32,19 +32,23 @@ pub enum Controller {
 
 /// Why a loop does not fly a vehicle.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("`{controller}` has the gains of a Crazyflie 2.x; vehicle `{vehicle}`: {what} is {found}, that of a Crazyflie {low} to {high}")]
+#[error(
+    "`{controller}` has the gains of a Crazyflie 2.x, and vehicle `{vehicle}` is none: its {what} is {found}{unit}, not {low} to {high}"
+)]
 pub struct ControllerError {
     controller: &'static str,
     vehicle: String,
     what: &'static str,
     found: f64,
+    unit: &'static str,
     low: f64,
     high: f64,
 }
 
 impl Controller {
     /// Each of them.
-    pub const ALL: [Self; 4] = [Self::Se3, Self::Pid, Self::Mellinger { feed_forward: false }, Self::Mellinger { feed_forward: true }];
+    pub const ALL: [Self; 4] =
+        [Self::Se3, Self::Pid, Self::Mellinger { feed_forward: false }, Self::Mellinger { feed_forward: true }];
 
     /// Its name.
     pub const fn name(self) -> &'static str {
@@ -74,14 +78,16 @@ impl Controller {
             vehicle.rotors.iter().map(|rotor| arm(&rotor.position).abs() * largest).sum::<f64>() / moment
         };
         let ranges = [
-            ("mass (kg)", vehicle.mass, 0.02, 0.042),
-            ("the share of its thrust in hover", vehicle.mass * GRAVITY / (4.0 * largest), 0.35, 0.8),
-            ("roll of all thrust (rad/s²)", turn(|[_, y, _]| *y, vehicle.inertia.xx), 600.0, 2400.0),
-            ("pitch of all thrust (rad/s²)", turn(|[x, _, _]| *x, vehicle.inertia.yy), 600.0, 2400.0),
+            ("mass", vehicle.mass, " kg", 0.02, 0.042),
+            ("share of all thrust in hover", vehicle.mass * GRAVITY / (4.0 * largest), "", 0.35, 0.8),
+            ("roll by all thrust", turn(|[_, y, _]| *y, vehicle.inertia.xx), " rad/s²", 600.0, 2400.0),
+            ("pitch by all thrust", turn(|[x, _, _]| *x, vehicle.inertia.yy), " rad/s²", 600.0, 2400.0),
         ];
-        match ranges.into_iter().find(|(_, found, low, high)| !(low..=high).contains(&found)) {
-            Some((what, found, low, high)) => {
-                Err(ControllerError { controller: self.name(), vehicle: vehicle.name.clone(), what, found, low, high })
+        match ranges.into_iter().find(|(_, found, _, low, high)| !(low..=high).contains(&found)) {
+            Some((what, found, unit, low, high)) => {
+                // Rounded for the reader.
+                let found = (found * 1e4).round() / 1e4;
+                Err(ControllerError { controller: self.name(), vehicle: vehicle.name.clone(), what, found, unit, low, high })
             }
             None => Ok(()),
         }

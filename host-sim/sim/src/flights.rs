@@ -28,7 +28,7 @@ pub enum FlightsError {
 pub struct Loop {
     /// Vehicle.
     pub vehicle: Vehicle,
-    /// The loop that flies it.
+    /// The loop that flies it, unless a flight stack of its own is given ([`rollout::fly_on`]).
     pub controller: Controller,
     /// Name of the position gains; the controller's if it has its own.
     pub gains: String,

@@ -46,7 +46,8 @@ pub fn fly(
     let groups: Vec<&[usize]> = order.chunks(BATCH).collect();
     let fly = |group: &&[usize]| {
         let plans: Vec<&FlightPlan<'_>> = group.iter().map(|&index| &plans[index]).collect();
-        let stacks = plans.iter().map(|plan| Software::new(vehicle, controller, settings, condition, plan)).collect::<Result<_, _>>()?;
+        let stacks =
+            plans.iter().map(|plan| Software::new(vehicle, controller, settings, condition, plan)).collect::<Result<_, _>>()?;
         let records = Group::new(vehicle, settings, condition, &plans, stacks)?.fly();
         Ok(group.iter().copied().zip(records).collect())
     };

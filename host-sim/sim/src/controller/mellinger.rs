@@ -2,10 +2,11 @@
 //! 2011: errors to a force, the attitude whose z axis is along it, torques from the attitude's error.
 //!
 //! *in* a target and a state; *out* a force with an attitude and body rates, then rotor speeds; *never* an attitude that is
-//! undefined: the last one stays; *source* equations 6 to 12 of the paper, and the gains, limits and rates of the Crazyflie's
-//! firmware, which adds integrals of position and yaw and the derivative of the body rates' error. What differs: this is another
-//! implementation; the mass is the vehicle's; the force in N becomes motor power by the vehicle's largest thrust, where the
-//! firmware has a figure of its own; the position part runs when there is a new position (100 Hz), the firmware's at 500 Hz.
+//! undefined: the last one stays; *source* sections III (body rates) and IV (control) of the paper, and the gains, limits and rates
+//! of the Crazyflie's firmware, which adds integrals of position and yaw and the derivative of the body rates' error. What differs:
+//! this is another implementation, which of the same states makes the firmware's powers to 7 of 65535 (the firmware rounds torques);
+//! the mass is the vehicle's, and a force becomes power by the vehicle's largest thrust (113,976 a newton for the file `crazyflie`),
+//! where the firmware has 0.029 kg and 132,000; the position part runs when there is a new position (100 Hz), not at 500 Hz.
 
 use impromptu_flight::types::{MotorCommand, State};
 use nalgebra::{Matrix3, Vector3};
@@ -122,8 +123,7 @@ impl Mellinger {
         self.yaw_integral = (self.yaw_integral - error[2] / self.control_hz).clamp(-INTEGRAL_YAW, INTEGRAL_YAW);
         let integral = [0.0, 0.0, KI_YAW * self.yaw_integral];
         let torque = std::array::from_fn(|axis| {
-            let asked =
-                KW[axis] * rate_error[axis] + KD[axis] * rate_change[axis] - KR[axis] * error[axis] + integral[axis];
+            let asked = KW[axis] * rate_error[axis] + KD[axis] * rate_change[axis] - KR[axis] * error[axis] + integral[axis];
             asked.clamp(-TORQUE, TORQUE)
         });
         self.motors.command(&Demand { thrust, torque })
@@ -136,7 +136,7 @@ pub(super) fn position_gains(vehicle: &Vehicle) -> PositionGains {
     PositionGains { proportional: per_mass(KP), derivative: per_mass(KV) }
 }
 
-/// Body rates, rad/s, of a vehicle that flies the desired acceleration and jerk without error (equation 7 and the one before).
+/// Body rates, rad/s, of a vehicle that flies the desired acceleration and jerk without error (h_ω of section III).
 fn body_rates(target: &Target) -> Vector3<f32> {
     let thrust = target.acceleration + Vector3::new(0.0, 0.0, GRAVITY as f32);
     let Some(attitude) = aligned(&thrust, target.reference.yaw) else { return Vector3::zeros() };

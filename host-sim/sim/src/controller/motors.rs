@@ -39,9 +39,9 @@ impl Motors {
 
     /// Rotor speeds. If a rotor shall give more than it has, all give less, by as much; none less than nothing.
     pub fn command(&self, demand: &Demand) -> MotorCommand {
-        let powers = self.shares.map(|shares| {
-            shares.iter().zip(demand.torque).fold(demand.thrust, |power, (share, torque)| power + share * torque)
-        });
+        let powers = self
+            .shares
+            .map(|shares| shares.iter().zip(demand.torque).fold(demand.thrust, |power, (share, torque)| power + share * torque));
         let excess = powers.iter().fold(0.0f32, |excess, power| excess.max(power - FULL));
         MotorCommand::saturated(powers.map(|power| ((power - excess).max(0.0) / FULL).sqrt()))
     }
@@ -50,4 +50,35 @@ impl Motors {
 /// Largest thrust of a rotor, N.
 pub(super) fn largest_thrust(vehicle: &Vehicle) -> f64 {
     vehicle.thrust_coefficient * vehicle.rotor_speed_max.powi(2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Forces of the rotors as shares of the largest, front left, front right, rear right, rear left.
+    fn shares(thrust: f32, torque: [f32; 3]) -> [f32; 4] {
+        let motors = Motors::new(&Vehicle::named("crazyflie").unwrap());
+        motors.command(&Demand { thrust, torque }).fractions().map(|speed| speed * speed)
+    }
+
+    #[test]
+    fn thrust_is_power_and_torques_have_the_bodys_signs() {
+        let near = |found: [f32; 4], expected: [f32; 4]| {
+            assert!(found.iter().zip(expected).all(|(found, expected)| (found * FULL - expected).abs() < 0.1), "{found:?}");
+        };
+        near(shares(30_000.0, [0.0; 3]), [30_000.0; 4]);
+        // Left side up; nose down; nose to the left, with the rotors that push there.
+        near(shares(30_000.0, [2_000.0, 0.0, 0.0]), [31_000.0, 29_000.0, 29_000.0, 31_000.0]);
+        near(shares(30_000.0, [0.0, 2_000.0, 0.0]), [29_000.0, 29_000.0, 31_000.0, 31_000.0]);
+        near(shares(30_000.0, [0.0, 0.0, 1_000.0]), [31_000.0, 29_000.0, 31_000.0, 29_000.0]);
+    }
+
+    #[test]
+    fn thrust_is_given_up_before_torque() {
+        let found = shares(64_000.0, [8_000.0, 0.0, 0.0]);
+        assert!((found[0] - 1.0).abs() < 1e-6 && ((found[0] - found[1]) * FULL - 8_000.0).abs() < 0.1, "{found:?}");
+        assert_eq!(shares(1_000.0, [8_000.0, 0.0, 0.0])[1], 0.0);
+        assert_eq!(shares(f32::NAN, [0.0; 3]), [0.0; 4]);
+    }
 }

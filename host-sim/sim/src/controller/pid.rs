@@ -1,11 +1,12 @@
 //! The Crazyflie's cascade of PIDs: position to velocity to angles and thrust at the reference's rate (100 Hz), angles to body rates
 //! to torques at the control rate (500 Hz).
 //!
-//! *in* a target and a state; *out* angles and thrust, then rotor speeds; *never* a velocity reference or an acceleration: the
-//! loop has no use for either; *source* the Crazyflie's documentation ("Controllers in the Crazyflie: cascaded PID") and the
-//! gains, limits and rates of its firmware. What differs: this is another implementation; angles are about the body's axes FLU
-//! (the firmware's pitch has the other sign); the low-pass filters on the derivatives of position and velocity are left out, as
-//! the gains behind them are zero; the commander that lowers the battery's and the landing's dangers is not there.
+//! *in* a target and a state; *out* angles and thrust, then rotor speeds; *never* a use of a velocity reference or an
+//! acceleration: the firmware makes none of either while it is told positions; *source* the Crazyflie's documentation ("cascaded
+//! PID") and the gains, limits and rates of its firmware. What differs: this is another implementation, which of the same states
+//! makes the firmware's powers to 4 of 65535 (the firmware rounds torques); angles are about the body's axes FLU (the firmware's
+//! pitch has the other sign); the low-pass filters of the derivatives of position and velocity are left out, as the gains behind
+//! them are zero; rates have no derivative at the first tick.
 
 mod axis;
 

@@ -43,3 +43,21 @@ impl<T> Link<T> {
         &self.arrived
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_arrives_when_it_is_due_and_the_first_at_once() {
+        let mut link = Link::new(3, -1);
+        let mut arrived = Vec::new();
+        for tick in 0..10 {
+            if tick % 2 == 0 {
+                link.send(Tick(tick), tick as i32);
+            }
+            arrived.push(*link.receive(Tick(tick)));
+        }
+        assert_eq!(arrived, [0, 0, 0, 0, 0, 2, 2, 4, 4, 6]);
+    }
+}

@@ -67,3 +67,29 @@ impl Axis {
         (kp * error + ki * self.integral - kd * change * self.hz).clamp(-limit, limit)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_output_is_proportional_and_integral_and_what_the_measurement_does() {
+        let mut axis = Axis::new(Gains::new(2.0, 10.0, 0.5).integrating(0.3).limited(5.0), 10.0);
+        // 2 * 1 + 10 * 0.1; then the measurement rises by 0.1 in 0.1 s; then the integral is at its limit, then the output.
+        assert_eq!(axis.step(1.0, 0.0), 3.0);
+        assert!((axis.step(0.5, 0.1) - (1.0 + 1.5 - 0.5)).abs() < 1e-5);
+        assert!((axis.step(0.9, 0.1) - (1.8 + 2.4)).abs() < 1e-5);
+        assert_eq!(axis.step(4.0, 0.1), 5.0);
+        assert!((axis.step(0.0, 0.1) - 3.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn an_angle_goes_round_and_a_number_that_is_none_is_forgotten() {
+        let mut axis = Axis::new(Gains::new(0.0, 0.0, 1.0), 1.0);
+        axis.step_angle(0.0, 179.0);
+        assert_eq!(axis.step_angle(0.0, -179.0), -2.0);
+        let mut axis = Axis::new(Gains::new(1.0, 1.0, 0.0), 1.0);
+        axis.step(f32::INFINITY, 0.0);
+        assert_eq!(axis.step(1.0, 0.0), 2.0);
+    }
+}
