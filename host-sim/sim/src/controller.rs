@@ -33,7 +33,7 @@ pub enum Controller {
 /// Why a loop does not fly a vehicle.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "`{controller}` has the gains of a Crazyflie 2.x, and vehicle `{vehicle}` is none: its {what} is {found}{unit}, not {low} to {high}"
+    "`{controller}` has a Crazyflie 2.x's gains, vehicle `{vehicle}` is none: its {what} is {found}{unit}, not {low} to {high}"
 )]
 pub struct ControllerError {
     controller: &'static str,

@@ -98,7 +98,7 @@ fn a_vehicle_that_is_no_crazyflie_is_refused_with_what_is_different() {
     let message = refusal("hummingbird", Controller::Pid).unwrap_err();
     assert_eq!(
         message,
-        "controller `pid` has the gains of a Crazyflie 2.x, and vehicle `hummingbird` is none: its mass is 0.5 kg, not 0.02 to 0.042"
+        "controller `pid` has a Crazyflie 2.x's gains, vehicle `hummingbird` is none: its mass is 0.5 kg, not 0.02 to 0.042"
     );
     let message = refusal("crazyflie-brushless", FEED_FORWARD).unwrap_err();
     assert!(message.contains("`mellinger_feed_forward`") && message.contains("its mass is 0.044 kg"), "{message}");

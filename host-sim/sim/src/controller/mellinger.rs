@@ -2,11 +2,13 @@
 //! 2011: errors to a force, the attitude whose z axis is along it, torques from the attitude's error.
 //!
 //! *in* a target and a state; *out* a force with an attitude and body rates, then rotor speeds; *never* an attitude that is
-//! undefined: the last one stays; *source* sections III (body rates) and IV (control) of the paper, and the gains, limits and rates
-//! of the Crazyflie's firmware, which adds integrals of position and yaw and the derivative of the body rates' error. What differs:
-//! this is another implementation, which of the same states makes the firmware's powers to 7 of 65535 (the firmware rounds torques);
-//! the mass is the vehicle's, and a force becomes power by the vehicle's largest thrust (113,976 a newton for the file `crazyflie`),
-//! where the firmware has 0.029 kg and 132,000; the position part runs when there is a new position (100 Hz), not at 500 Hz.
+//! undefined: the last one stays; *source* sections III (body rates) and IV (control) of the paper, and the gains, limits and
+//! rates of the Crazyflie's firmware, which adds integrals of position and yaw and the derivative of the body rates' error.
+//!
+//! What differs: this is another implementation, which of the same states makes the firmware's powers to 7 of 65535 (the firmware
+//! rounds torques); the mass is the vehicle's, and a force becomes power by the vehicle's largest thrust (113,976 a newton for
+//! the file `crazyflie`), where the firmware has 0.029 kg and 132,000; the position part runs when there is a new position
+//! (100 Hz), not at 500 Hz.
 
 use impromptu_flight::types::{MotorCommand, State};
 use nalgebra::{Matrix3, Vector3};

@@ -1,8 +1,8 @@
 //! From a loop's output to the rotors, in the units of the Crazyflie's motors: 65535 is full power.
 //!
 //! *in* thrust and the three torques; *out* rotor speeds; *never* torque given up before thrust where a rotor is at its limit;
-//! *source* the Crazyflie's documentation of its power distribution. What differs: a rotor's thrust is power / 65535 of the largest
-//! thrust of this vehicle, at once and at every charge of the battery; numbers are not rounded.
+//! *source* the Crazyflie's documentation of its power distribution. What differs: a rotor's thrust is power / 65535 of the
+//! largest thrust of this vehicle, at every charge of the battery; numbers are not rounded.
 
 use impromptu_flight::types::MotorCommand;
 

@@ -1,5 +1,5 @@
-//! The Crazyflie's cascade of PIDs: position to velocity to angles and thrust at the reference's rate (100 Hz), angles to body rates
-//! to torques at the control rate (500 Hz).
+//! The Crazyflie's cascade of PIDs: position to velocity to angles and thrust at the reference's rate (100 Hz), angles to body
+//! rates to torques at the control rate (500 Hz).
 //!
 //! *in* a target and a state; *out* angles and thrust, then rotor speeds; *never* a use of a velocity reference or an
 //! acceleration: the firmware makes none of either while it is told positions; *source* the Crazyflie's documentation ("cascaded

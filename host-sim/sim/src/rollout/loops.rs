@@ -20,7 +20,7 @@ pub(super) enum Loops {
     /// The flight stack's own.
     Se3(Link<ThrustVector>),
     /// The cascade of PIDs, with the rate of the references.
-    Pid(Pid, Link<Attitude>, f32),
+    Pid(Box<Pid>, Link<Attitude>, f32),
     /// Mellinger's.
     Mellinger(Mellinger, Link<ThrustWish>, f32),
 }
@@ -36,7 +36,7 @@ impl Loops {
         let (slow, fast) = (rates.reference_hz(), rates.control_hz);
         match controller {
             Controller::Se3 => Self::own(delay),
-            Controller::Pid => Self::Pid(Pid::new(vehicle, slow, fast), Link::new(delay, Attitude::LEVEL), slow),
+            Controller::Pid => Self::Pid(Box::new(Pid::new(vehicle, slow, fast)), Link::new(delay, Attitude::LEVEL), slow),
             Controller::Mellinger { feed_forward } => {
                 let controller = Mellinger::new(vehicle, feed_forward, slow, fast);
                 Self::Mellinger(controller, Link::new(delay, ThrustWish::NONE), slow)
