@@ -8,6 +8,7 @@ use std::hint::black_box;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use impromptu_sim::{
     condition::Condition,
+    controller::Controller,
     plant::{BATCH, Disturbance, GRAVITY, Plant, State, States, Variation, Vehicle},
     rollout::{self, FlightPlan},
     trajectory::Trajectory,
@@ -55,7 +56,9 @@ fn closed_loop(criterion: &mut Criterion) {
     group.throughput(Throughput::Elements((plans.len() * trajectory.samples.len() * 5) as u64));
     group.sample_size(20);
     group.bench_function("500 Hz steps on one core", |bencher| {
-        bencher.iter(|| pool.install(|| rollout::fly(&vehicle, &settings, &condition, black_box(&plans)).expect("flights")));
+        bencher.iter(|| {
+            pool.install(|| rollout::fly(&vehicle, Controller::Se3, &settings, &condition, black_box(&plans)).expect("flights"))
+        });
     });
     group.finish();
 }

@@ -1,13 +1,14 @@
 //! Flights of every method over the test strokes.
 
-use impromptu_firmware::{adapter::Lanes, model::Model};
+use impromptu_firmware::{adapter::Lanes, learning::Parts, model::Model};
 use impromptu_model_export::{ExportError, verify};
 use impromptu_report::{FlightTrace, LaneOutcome, Margins, Method, ModelCard, PerFlight};
 use impromptu_sim::{
     flight_log::FlightLog,
     flights::Loop,
+    learned::{Learned, after},
     rollout::{FlightPlan, RolloutError},
-    trajectory::Trajectory,
+    trajectory::{Trajectory, TrajectoryError, strokes},
 };
 use impromptu_training::build::Built;
 
@@ -17,6 +18,9 @@ const FEEDBACK: Lanes = Lanes { network: false, feedback: true };
 /// Why nothing was evaluated.
 #[derive(Debug, thiserror::Error)]
 pub enum EvaluationError {
+    /// A stroke cannot be sampled.
+    #[error(transparent)]
+    Trajectory(#[from] TrajectoryError),
     /// Flights failed.
     #[error(transparent)]
     Rollout(#[from] RolloutError),
@@ -25,11 +29,11 @@ pub enum EvaluationError {
     Export(#[from] ExportError),
 }
 
-/// The file and the lanes of a method; `None` for the baseline.
+/// The file and the lanes of a method; `None` for the baseline and for what is not in a file.
 fn flown_by(built: &Built, method: Method) -> Option<(&[u8], Lanes)> {
     let models = &built.models;
     let (bytes, lanes) = match method {
-        Method::Baseline => return None,
+        Method::Baseline | Method::Learned | Method::FullLearned => return None,
         Method::Feedforward => (&models.feedforward, NETWORK),
         Method::Feedback => (&models.feedforward, FEEDBACK),
         Method::FeedforwardFeedback => (&models.feedforward, Lanes::BOTH),
@@ -58,8 +62,10 @@ pub fn evaluate(
     let baseline = closed_loop.errors(trajectories, None, 1.0, flight_seed)?;
     let unguarded = closed_loop.unguarded();
     let mut flights = Vec::new();
-    for method in Method::ALL {
+    // What several models would be beneath is left to `evaluate --learn`.
+    for method in Method::ALL.into_iter().filter(|method| *method != Method::FullLearned) {
         let errors = match flown_by(built, method) {
+            None if method == Method::Learned => learned(closed_loop, None, trajectories, speed, flight_seed, LEARNED_SECONDS)?,
             None => baseline.clone(),
             Some((bytes, lanes)) => {
                 let model = Model::from_bytes(bytes).map_err(ExportError::Refused)?;
@@ -73,6 +79,39 @@ pub fn evaluate(
     }
     Ok(flights)
 }
+
+/// How long is learned before the flights that are judged, s of motion.
+pub const LEARNED_SECONDS: u32 = 60;
+
+/// RMS errors, m, over trajectories with what so many seconds of other strokes at that speed taught; each goes on learning.
+///
+/// # Errors
+/// If a flight cannot be flown.
+pub fn learned(
+    closed_loop: &Loop,
+    model: Option<(&Model<'_>, Lanes)>,
+    trajectories: &[Trajectory],
+    speed: f64,
+    flight_seed: u64,
+    seconds: u32,
+) -> Result<Vec<f64>, EvaluationError> {
+    let teach = teaching(closed_loop, speed, flight_seed, seconds)?;
+    let learned = Learned { closed_loop, model, parts: Parts::BOTH, seed: flight_seed };
+    Ok(after(&learned, seconds, &teach, trajectories)?.errors)
+}
+
+/// Strokes of so many seconds and more that teach, none of which is judged.
+///
+/// # Errors
+/// If they cannot be sampled.
+pub fn teaching(closed_loop: &Loop, speed: f64, flight_seed: u64, seconds: u32) -> Result<Vec<Trajectory>, TrajectoryError> {
+    // A stroke takes ten seconds and more at normal speed.
+    let count = 1 + (f64::from(seconds) * speed.max(0.05) / 10.0).ceil() as usize;
+    strokes(flight_seed ^ TEACHING, count, speed, closed_loop.rate_hz())
+}
+
+/// Between the seeds of strokes that are judged and those that teach.
+const TEACHING: u64 = 0x7ea_c413;
 
 /// Flights as they are reported, of their RMS errors and the baseline's over the same trajectories, m.
 pub fn per_flight(

@@ -21,6 +21,24 @@ pub struct Figure {
     pub curves: Vec<Curve>,
 }
 
+impl Figure {
+    /// How the error melts while a loop learns in flight: points (s, cm) without learning and with it, the root mean square over
+    /// so many flights of what `flown` names.
+    pub fn first_minute(section: &str, flown: &str, flights: usize, without: Vec<(f64, f64)>, with: Vec<(f64, f64)>) -> Self {
+        Self {
+            section: section.into(),
+            name: "first_minute".into(),
+            title: format!(
+                "The error melts while it flies: {flown}, nothing trained before. Position error second by second, root mean \
+                 square of {flights} flights of unseen strokes, one stroke after another; rests between them are left out."
+            ),
+            x: Axis::linear("time in motion [s]"),
+            y: Axis::logarithmic("position error [cm]"),
+            curves: vec![Curve::line("learning", with), Curve::line("without learning", without)],
+        }
+    }
+}
+
 /// An axis: quantity and unit, linear or logarithmic.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Axis {

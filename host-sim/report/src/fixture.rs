@@ -62,7 +62,7 @@ pub(super) fn small() -> Results {
     }
 }
 
-/// Two vehicles, four conditions, three speeds, ten methods, thirty flights; eight flights in full.
+/// Two vehicles, four conditions, three speeds, twelve methods, thirty flights; eight flights in full.
 pub(super) fn full() -> Results {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(7);
     let mut per_flight = Vec::new();
@@ -144,6 +144,7 @@ fn remaining(method: Method) -> f64 {
         Method::NetF32 | Method::NetInt8 => 0.035,
         Method::FullRidge => 0.02,
         Method::FullF32 | Method::FullInt8 => 0.012,
+        Method::Learned | Method::FullLearned => 0.015,
     }
 }
 

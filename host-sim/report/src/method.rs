@@ -1,4 +1,4 @@
-//! The ten ways of flying that are compared, with one name for each in JSON, in tables and in words.
+//! The twelve ways of flying that are compared, with one name for each in JSON, in tables and in words.
 
 use serde::{Deserialize, Serialize};
 
@@ -28,6 +28,10 @@ pub enum Method {
     FullF32,
     /// Both lanes, network in int8: what is flashed.
     FullInt8,
+    /// Both parts that are learned in flight, with nothing before them.
+    Learned,
+    /// The parts that are learned in flight on top of a model with the lanes that it has.
+    FullLearned,
 }
 
 /// Which group of methods a colour stands for in the plots.
@@ -43,11 +47,13 @@ pub enum Family {
     Network,
     /// Both lanes.
     BothLanes,
+    /// Learned in flight.
+    Learned,
 }
 
 impl Method {
     /// Every method, in the order of the table's columns.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::Baseline,
         Self::Feedforward,
         Self::Feedback,
@@ -58,6 +64,8 @@ impl Method {
         Self::FullRidge,
         Self::FullF32,
         Self::FullInt8,
+        Self::Learned,
+        Self::FullLearned,
     ];
 
     /// The name in JSON and CSV.
@@ -74,6 +82,8 @@ impl Method {
             Self::FullRidge => "full_ridge",
             Self::FullF32 => "full_f32",
             Self::FullInt8 => "full_int8",
+            Self::Learned => "learned",
+            Self::FullLearned => "full_learned",
         }
     }
 
@@ -91,6 +101,8 @@ impl Method {
             Self::FullRidge => ["ridge", "+ lane"],
             Self::FullF32 => ["net f32", "+ lane"],
             Self::FullInt8 => ["net int8", "+ lane"],
+            Self::Learned => ["learned", "in flight"],
+            Self::FullLearned => ["model", "+ learned"],
         }
     }
 
@@ -122,6 +134,8 @@ impl Method {
             Self::FullRidge => "Ridge regression in the network's place, plus the feedback lane.",
             Self::FullF32 => "Both lanes, with the network in 32-bit floating point: shows what quantisation costs.",
             Self::FullInt8 => "Both lanes, with the network in 8-bit weights: exactly what is flashed.",
+            Self::Learned => "Nothing was trained: the loop learned while it flew, for as long as is said, and goes on.",
+            Self::FullLearned => "A model with its lanes, and what the loop learned on top of it while it flew.",
         }
     }
 
@@ -133,6 +147,7 @@ impl Method {
             Self::Ridge | Self::FullRidge => Family::Ridge,
             Self::NetF32 | Self::NetInt8 => Family::Network,
             Self::FullF32 | Self::FullInt8 => Family::BothLanes,
+            Self::Learned | Self::FullLearned => Family::Learned,
             Self::Feedforward | Self::Feedback | Self::FeedforwardFeedback => Family::Comparison,
         }
     }
@@ -148,7 +163,8 @@ mod tests {
             Method::ALL.iter().map(|method| serde_json::to_value(method).unwrap().as_str().unwrap().to_owned()).collect();
         assert_eq!(
             names.join(" "),
-            "baseline feedforward feedback feedforward_feedback ridge net_f32 net_int8 full_ridge full_f32 full_int8"
+            "baseline feedforward feedback feedforward_feedback ridge net_f32 net_int8 full_ridge full_f32 full_int8 \
+             learned full_learned"
         );
         assert!(Method::ALL.iter().zip(&names).all(|(method, name)| method.name() == name));
     }

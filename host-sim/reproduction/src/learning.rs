@@ -6,22 +6,23 @@
 //! of Widrow and Walach 1996 (filtered-x) and Pereida, Helwa, Schoellig 2018 (a learned map that corrects references).
 
 mod cases;
-mod flown;
-mod melting;
 mod report;
 mod row;
 
 use std::collections::BTreeMap;
 
 use anyhow::Context as _;
-use impromptu_firmware::model::Model;
-use impromptu_report::study::Study;
-use impromptu_sim::{flights::Loop, trajectory::strokes};
+use impromptu_firmware::{adapter::Lanes, model::Model};
+use impromptu_report::{Figure, study::Study};
+use impromptu_sim::{
+    flights::Loop,
+    learned::{Learned, after, one_after_another, second_by_second},
+    trajectory::strokes,
+};
 use impromptu_training::{Purpose, Recipe, build, derived, observer::Observer};
 use rayon::prelude::*;
 
 pub use cases::{Case, Start, cases};
-pub use flown::{Learned, after, one_after_another};
 pub use row::{Row, Seconds};
 
 /// What the study covers.
@@ -58,8 +59,30 @@ pub fn run(settings: &Settings, command: &str, observer: &dyn Observer) -> anyho
     let mut study = Study::new("Learning in flight", command, settings.seed);
     report::tell(&mut study, settings, &all, &rows);
     observer.stage("the first minute");
-    study.figures.push(melting::figure(settings)?);
+    study.figures.extend(first_minutes(settings)?);
     Ok(Found { rows, study })
+}
+
+/// Flights that a picture of the first minute averages.
+const FLIGHTS: u64 = 10;
+
+/// How the error melts, for each kind of loop in `lab`.
+fn first_minutes(settings: &Settings) -> anyhow::Result<Vec<Figure>> {
+    let seed = derived(settings.seed, Purpose::Test);
+    let kinds = cases().into_iter().filter(|case| case.in_a_picture());
+    kinds
+        .map(|case| {
+            let closed_loop = case.closed_loop()?;
+            let strokes = |flight| strokes(seed ^ (flight + 1), 5, case.speed, closed_loop.rate_hz());
+            let flights = (0..FLIGHTS).map(strokes).collect::<Result<Vec<_>, _>>()?;
+            let [without, with] = second_by_second(&closed_loop, &flights, 60, seed)?;
+            let centimetres =
+                |points: Vec<(f64, f64)>| points.into_iter().map(|(second, error)| (second, 100.0 * error)).collect();
+            let flown = format!("{} with loop {} in {}", case.vehicle, case.kind(), case.air);
+            let figure = Figure::first_minute(report::SECTION, &flown, flights.len(), centimetres(without), centimetres(with));
+            Ok(Figure { name: format!("first_minute_{}", case.kind()), ..figure })
+        })
+        .collect()
 }
 
 /// Files of the models that the cases start with, by the loop that they were made for.
@@ -83,7 +106,8 @@ fn fly(settings: &Settings, case: &Case, models: &BTreeMap<String, Vec<u8>>) -> 
     let rate = closed_loop.rate_hz();
     let test = strokes(seed, settings.strokes, case.speed, rate)?;
     let teach = strokes(derived(settings.seed, Purpose::Training), 12, case.speed, rate)?;
-    let learned = Learned { closed_loop: &closed_loop, model: model.as_ref(), parts: case.parts, seed };
+    let learned =
+        Learned { closed_loop: &closed_loop, model: model.as_ref().map(|model| (model, Lanes::BOTH)), parts: case.parts, seed };
     let flown = match case.seconds {
         Seconds::FromFirstStroke => one_after_another(&learned, &test, case.then_later_s),
         Seconds::After(seconds) => after(&learned, seconds, &teach, &test),

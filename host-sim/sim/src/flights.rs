@@ -8,6 +8,7 @@ use impromptu_flight::{
 
 use crate::{
     condition::Condition,
+    controller::Controller,
     flight_log::FlightLog,
     plant::Vehicle,
     rollout::{self, Dither, FlightPlan, FlightRecord, RolloutError},
@@ -30,7 +31,9 @@ pub enum FlightsError {
 pub struct Loop {
     /// Vehicle.
     pub vehicle: Vehicle,
-    /// Name of the position gains.
+    /// The loop that flies it, unless a flight stack of its own is given ([`rollout::fly_on`]).
+    pub controller: Controller,
+    /// Name of the position gains; the controller's if it has its own.
     pub gains: String,
     /// Settings of the flight stack.
     pub settings: Settings,
@@ -49,10 +52,24 @@ impl Loop {
         Ok(Self {
             settings: rollout::settings(&vehicle, gains)?,
             vehicle,
+            controller: Controller::Se3,
             gains: gains.into(),
             condition,
             guard: GuardSettings::default(),
         })
+    }
+
+    /// The same vehicle flown by a controller, which brings its own gains: they go by its name.
+    ///
+    /// # Errors
+    /// If the controller is not for this vehicle.
+    pub fn flown_by(mut self, controller: Controller) -> Result<Self, RolloutError> {
+        controller.check(&self.vehicle)?;
+        if let Some(gains) = controller.position_gains(&self.vehicle) {
+            self.settings.position = rollout::position_gains(&gains);
+            self.gains = controller.name().into();
+        }
+        Ok(Self { controller, ..self })
     }
 
     /// The same loop with `seconds` more delay in the whole of it ([`Condition::delayed`]).
@@ -77,7 +94,7 @@ impl Loop {
     /// # Errors
     /// The first plan that cannot be flown.
     pub fn fly(&self, plans: &[FlightPlan<'_>]) -> Result<Vec<FlightRecord>, RolloutError> {
-        rollout::fly(&self.vehicle, &self.settings, &self.condition, plans)
+        rollout::fly(&self.vehicle, self.controller, &self.settings, &self.condition, plans)
     }
 
     /// Learns beside its flights, from nothing and with a guess of its response from its gains.
@@ -97,7 +114,7 @@ impl Loop {
     /// # Errors
     /// If it cannot be flown.
     pub fn fly_learning(&self, plan: &FlightPlan<'_>, learning: &mut FlightLearning) -> Result<FlightRecord, RolloutError> {
-        rollout::fly_learning(&self.vehicle, &self.settings, &self.condition, plan, learning)
+        rollout::fly_learning(&self.vehicle, self.controller, &self.settings, &self.condition, plan, learning)
     }
 
     /// Logs of the baseline over motions, with a dither on the position reference if given.

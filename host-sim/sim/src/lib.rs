@@ -19,9 +19,11 @@
 //! | 1 | `plant`, `trajectory` | the rigid body with its rotors and vehicle files; what is desired at each tick |
 //! | 1 | `columns` | tables with named columns |
 //! | 2 | `weather`, `sensors`, `flight_log` | wind and disturbance; noise and delay; what a flight leaves behind, as CSV |
+//! | 2 | `controller` | loops that a vehicle may have in the place of the flight stack's own |
 //! | 3 | `condition` | what a flight meets, by name |
 //! | 4 | `rollout` | closed-loop flights, eight at once |
 //! | 5 | `flights` | a vehicle with its gains under one condition, which flies many flights |
+//! | 6 | `learned` | flights that learn, and what is left of their error |
 //!
 //! ```
 //! use impromptu_sim::{condition::Condition, flights::Loop, plant::Vehicle, trajectory::strokes};
@@ -36,8 +38,10 @@
 
 pub mod columns;
 pub mod condition;
+pub mod controller;
 pub mod flight_log;
 pub mod flights;
+pub mod learned;
 pub mod plant;
 pub mod rollout;
 pub mod sensors;

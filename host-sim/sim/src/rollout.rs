@@ -5,6 +5,8 @@
 
 mod conversion;
 mod faults;
+mod link;
+mod loops;
 mod pilot;
 mod plan;
 mod stack;
@@ -18,23 +20,25 @@ use rayon::prelude::*;
 
 use crate::{
     condition::Condition,
+    controller::Controller,
     plant::{BATCH, GRAVITY, Plant, State, States, Variation, Vehicle},
     weather::Weather,
 };
-pub use conversion::{setpoint, settings};
+pub use conversion::{position_gains, setpoint, settings};
 pub use faults::FaultyFlight;
 use pilot::Pilot;
 pub use plan::{Dither, FlightPlan, FlightRecord, RolloutError};
 pub use stack::FlightStack;
 use stack::Software;
 
-/// Flies every plan under one condition; results in the plans' order. Groups of eight run
+/// Flies every plan under one condition with one loop; results in the plans' order. Groups of eight run
 /// on the threads of the current rayon pool with the feature `threads`, one after another without.
 ///
 /// # Errors
 /// The first plan that cannot be flown.
 pub fn fly(
     vehicle: &Vehicle,
+    controller: Controller,
     settings: &Settings,
     condition: &Condition,
     plans: &[FlightPlan<'_>],
@@ -45,7 +49,8 @@ pub fn fly(
     let groups: Vec<&[usize]> = order.chunks(BATCH).collect();
     let fly = |group: &&[usize]| {
         let plans: Vec<&FlightPlan<'_>> = group.iter().map(|&index| &plans[index]).collect();
-        let stacks = plans.iter().map(|plan| Software::new(vehicle, settings, condition, plan)).collect::<Result<_, _>>()?;
+        let stacks =
+            plans.iter().map(|plan| Software::new(vehicle, controller, settings, condition, plan)).collect::<Result<_, _>>()?;
         let records = Group::new(vehicle, settings, condition, &plans, stacks)?.fly();
         Ok(group.iter().copied().zip(records).collect())
     };
@@ -68,12 +73,13 @@ pub fn fly(
 /// If the plan cannot be flown.
 pub fn fly_learning(
     vehicle: &Vehicle,
+    controller: Controller,
     settings: &Settings,
     condition: &Condition,
     plan: &FlightPlan<'_>,
     learning: &mut FlightLearning,
 ) -> Result<FlightRecord, RolloutError> {
-    let stack = Software::new(vehicle, settings, condition, plan)?.learning(learning);
+    let stack = Software::new(vehicle, controller, settings, condition, plan)?.learning(learning);
     fly_on(stack, vehicle, settings, condition, plan)
 }
 

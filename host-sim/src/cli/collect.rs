@@ -86,6 +86,11 @@ struct Log {
 }
 
 impl Collect {
+    /// Why the arguments do not go together, if they do not.
+    pub(super) fn conflict(&self) -> Option<String> {
+        self.situation.conflict()
+    }
+
     pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
         let closed_loop = self.situation.closed_loop()?;
         let recipe = invocation.configuration.recipe();

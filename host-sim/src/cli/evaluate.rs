@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, Result};
 use clap::Args;
-use impromptu_experiment::evaluation::per_flight;
-use impromptu_firmware::adapter::Lanes;
+use impromptu_experiment::evaluation::{learned, per_flight};
+use impromptu_firmware::{adapter::Lanes, model::Model};
 use impromptu_report::{Method, PerFlight, Row, summarise};
 use impromptu_sim::{
     flights::Loop,
@@ -18,23 +18,28 @@ use super::{
     Invocation,
     model_file::{ModelFile, method},
     output::{number, table},
-    situation::{Situation, milliseconds, speed},
+    situation::{Situation, learning, milliseconds, speed},
 };
 
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-A row for each model and each of: the baseline, the network alone, the feedback lane alone, both lanes. Reductions are those of
-the RMS position error against the baseline's flight of the same stroke: mean and worst over the strokes.
+A row for each model and each of: the baseline, the network alone, the feedback lane alone, both lanes. With --learn also what
+the loop learns in flight from nothing, and on top of each model with both lanes. Reductions are those of the RMS position error
+against the baseline's flight of the same stroke: mean and worst over the strokes.
 
 Examples:
   host-sim evaluate --model models/model.impromptu
   host-sim evaluate --model a.impromptu --model b.impromptu --condition rough --speed 1,1.7 --format json
-  host-sim evaluate --model models/model.impromptu --extra-delay-ms 20 --seed 5")]
+  host-sim evaluate --model models/model.impromptu --extra-delay-ms 20 --seed 5
+  host-sim evaluate --learn 60 --controller pid")]
 pub(super) struct Evaluate {
     /// Model files.
-    #[arg(long, value_name = "FILE", required = true, num_args = 1..)]
+    #[arg(long, value_name = "FILE", required_unless_present = "learn", num_args = 1..)]
     model: Vec<PathBuf>,
+    /// Learns in flight: from SECONDS of motion of other strokes before each flight, and in it.
+    #[arg(long, value_name = "SECONDS", value_parser = learning)]
+    learn: Option<u32>,
     #[command(flatten)]
     situation: Situation,
     /// Factors on the speed of the strokes.
@@ -65,6 +70,11 @@ struct Evaluation {
 }
 
 impl Evaluate {
+    /// Why the arguments do not go together, if they do not.
+    pub(super) fn conflict(&self) -> Option<String> {
+        self.situation.conflict()
+    }
+
     pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
         let closed_loop = self.situation.closed_loop()?.delayed(self.extra_delay_ms / 1e3);
         let seed = invocation.configuration.seed();
@@ -78,22 +88,30 @@ impl Evaluate {
         invocation.console.note(&format!("seed {seed}"));
         let test_seed = invocation.configuration.seed_of(Purpose::Test);
         let mut rows = Vec::new();
-        let of = (files.len() * self.speed.len()) as u64;
+        let mut done = 0;
+        let of = (self.speed.len() * (files.len() + usize::from(self.learn.is_some()))) as u64;
         for &speed in &self.speed {
             let trajectories = strokes(test_seed, self.strokes as usize, speed, closed_loop.rate_hz())?;
             let baseline = closed_loop.errors(&trajectories, None, 1.0, test_seed)?;
+            let flights = Flights {
+                closed_loop: &closed_loop,
+                trajectories: &trajectories,
+                baseline: &baseline,
+                speed,
+                test_seed,
+                seed,
+                learn: self.learn,
+            };
+            let mut add = |model: String, flights: &[PerFlight]| {
+                rows.extend(summarise(flights).into_iter().map(|row| ModelRow { model: model.clone(), row }));
+                done += 1;
+                invocation.console.steps(done, of);
+            };
+            if self.learn.is_some() {
+                add("none".into(), &flights.of_none()?);
+            }
             for file in &files {
-                let flights = Flights {
-                    closed_loop: &closed_loop,
-                    trajectories: &trajectories,
-                    baseline: &baseline,
-                    speed,
-                    test_seed,
-                    seed,
-                };
-                let flights = flights.of(file).with_context(|| file.name())?;
-                rows.extend(summarise(&flights).into_iter().map(|row| ModelRow { model: file.name(), row }));
-                invocation.console.steps(rows.len() as u64, of);
+                add(file.name(), &flights.of(file).with_context(|| file.name())?);
             }
         }
         invocation.console.finish();
@@ -110,6 +128,7 @@ struct Flights<'a> {
     speed: f64,
     test_seed: u64,
     seed: u64,
+    learn: Option<u32>,
 }
 
 impl Flights<'_> {
@@ -125,7 +144,21 @@ impl Flights<'_> {
             let errors = self.closed_loop.errors(self.trajectories, Some((&model, lanes)), 1.0, self.test_seed)?;
             flights.extend(self.scored(method(&model, lanes), &errors));
         }
+        flights.extend(self.learned(Some((&model, Lanes::BOTH)), Method::FullLearned)?);
         Ok(flights)
+    }
+
+    /// Every flight of the baseline, and of what is learned from nothing.
+    fn of_none(&self) -> Result<Vec<PerFlight>> {
+        let mut flights = self.scored(Method::Baseline, self.baseline);
+        flights.extend(self.learned(None, Method::Learned)?);
+        Ok(flights)
+    }
+
+    fn learned(&self, model: Option<(&Model<'_>, Lanes)>, method: Method) -> Result<Vec<PerFlight>> {
+        let Some(seconds) = self.learn else { return Ok(Vec::new()) };
+        let errors = learned(self.closed_loop, model, self.trajectories, self.speed, self.test_seed, seconds)?;
+        Ok(self.scored(method, &errors))
     }
 
     fn scored(&self, method: Method, errors: &[f64]) -> Vec<PerFlight> {

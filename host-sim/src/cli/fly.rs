@@ -7,15 +7,18 @@ use std::{
 
 use anyhow::{Context as _, Result, bail};
 use clap::{Args, ValueEnum};
-use impromptu_experiment::evaluation::per_flight;
+use impromptu_experiment::evaluation::{per_flight, teaching};
 use impromptu_files::text::line;
 use impromptu_firmware::{
     adapter::Lanes,
     guard::{Trip, Trips},
+    learning::Parts,
 };
 use impromptu_pil::LinkKind;
 use impromptu_report::{Method, PerFlight};
 use impromptu_sim::{
+    controller::Controller,
+    learned::{Learned, taught},
     rollout::{FlightPlan, FlightRecord},
     trajectory::strokes,
 };
@@ -27,7 +30,7 @@ use super::{
     model_file::{ModelFile, method},
     output::{number, table},
     processor::Flights,
-    situation::{Situation, milliseconds, speed},
+    situation::{Situation, learning, milliseconds, speed},
     trajectory,
 };
 
@@ -41,6 +44,8 @@ Examples:
   host-sim fly --trajectory figure8
   host-sim fly --model models/model.impromptu --trajectory letters:HI --speed 1.7 --log hi.csv
   host-sim fly --model models/model.impromptu --trajectory own.csv --condition rough --extra-delay-ms 20 --lanes network
+  host-sim fly --trajectory figure8 --controller pid
+  host-sim fly --trajectory figure8 --learn 60 --controller pid
   host-sim fly --pil --model models/model.impromptu")]
 pub(super) struct Fly {
     /// Model file; without it the baseline flies alone.
@@ -60,6 +65,9 @@ pub(super) struct Fly {
     /// Lanes of the model that are on.
     #[arg(long, value_enum, default_value_t, requires = "model")]
     lanes: LaneChoice,
+    /// Learns in flight, from nothing or on top of the model: from SECONDS of motion of other strokes, and on the way.
+    #[arg(long, value_name = "SECONDS", num_args = 0..=1, default_missing_value = "0", conflicts_with = "pil", value_parser = learning)]
+    learn: Option<u32>,
     /// Flies through the firmware on the emulated microcontroller, which it builds.
     #[arg(long)]
     pil: bool,
@@ -70,7 +78,7 @@ pub(super) struct Fly {
     #[arg(long, value_name = "N", default_value = "30", requires = "pil")]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=10_000))]
     strokes: u32,
-    /// CSV file for the log of the last flight: the add-on's, or the baseline's without --model.
+    /// CSV file for the log of the last flight: the one that learns, the model's, or the baseline's.
     #[arg(long, value_name = "OUT.csv", conflicts_with = "pil")]
     log: Option<PathBuf>,
 }
@@ -129,6 +137,14 @@ impl Tripped {
 }
 
 impl Fly {
+    /// Why the arguments do not go together, if they do not.
+    pub(super) fn conflict(&self) -> Option<String> {
+        let controller = self.situation.controller;
+        let elsewhere = self.pil && controller != Controller::Se3;
+        let reason = || format!("--pil: the firmware flies its own loop, se3; leave out --controller {}", controller.name());
+        elsewhere.then(reason).or_else(|| self.situation.conflict())
+    }
+
     pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
         if let Some(log) = &self.log {
             let inputs = self.model.as_deref().into_iter().chain(self.trajectory.as_deref().map(Path::new));
@@ -169,7 +185,7 @@ impl Fly {
         let seed = invocation.configuration.seed();
         let flight_seed = invocation.configuration.seed_of(Purpose::Test);
         invocation.console.note(&format!("seed {seed}"));
-        let baseline = FlightPlan { log: model.is_none(), ..FlightPlan::new(&trajectory, flight_seed) };
+        let baseline = FlightPlan { log: true, ..FlightPlan::new(&trajectory, flight_seed) };
         let mut methods = vec![Method::Baseline];
         let mut plans = vec![baseline];
         if let Some(model) = &model {
@@ -177,8 +193,17 @@ impl Fly {
             plans.push(FlightPlan { log: true, ..FlightPlan::new(&trajectory, flight_seed).with(model, lanes) });
             methods.push(method(model, lanes));
         }
-        let records =
+        let mut records =
             closed_loop.fly(&plans).with_context(|| file.as_ref().map_or_else(|| trajectory.name.clone(), ModelFile::name))?;
+        if let Some(seconds) = self.learn {
+            let model = model.as_ref().map(|model| (model, self.lanes.lanes()));
+            let learned = Learned { closed_loop: &closed_loop, model, parts: Parts::BOTH, seed: flight_seed };
+            let teach = teaching(&closed_loop, self.speed, flight_seed, seconds)?;
+            let (mut learning, _) = taught(&learned, seconds, &teach)?;
+            let plan = FlightPlan { model, log: true, ..FlightPlan::new(&trajectory, flight_seed) };
+            records.push(closed_loop.fly_learning(&plan, &mut learning)?);
+            methods.push(if model.is_some() { Method::FullLearned } else { Method::Learned });
+        }
         if let Some(path) = &self.log {
             write_last(&records, path)?;
             invocation.console.note(&format!("log: {}", path.display()));

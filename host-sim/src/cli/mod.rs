@@ -27,7 +27,7 @@ use std::{
 };
 
 use anyhow::{Context as _, Result};
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory as _, Parser, Subcommand};
 use impromptu_files::{place, text::line};
 
 use self::{configuration::Configuration, output::Format, progress::Console};
@@ -109,6 +109,20 @@ enum Command {
     Trajectory(trajectory::TrajectoryCommand),
 }
 
+impl Command {
+    /// Why the arguments do not go together, if they do not: what clap cannot be told.
+    fn conflict(&self) -> Option<String> {
+        match self {
+            Self::Collect(command) => command.conflict(),
+            Self::Train(command) => command.conflict(),
+            Self::Fly(command) => command.conflict(),
+            Self::Evaluate(command) => command.conflict(),
+            Self::Study(command) => command.conflict(),
+            Self::Diagnose(_) | Self::Report(_) | Self::Trajectory(_) => None,
+        }
+    }
+}
+
 /// What a command is given beside its own arguments.
 struct Invocation {
     configuration: Configuration,
@@ -141,6 +155,9 @@ where
         // Prints help and version on stdout with code 0, everything else on stderr with code 2.
         Err(error) => error.exit(),
     };
+    if let Some(reason) = arguments.command.as_ref().and_then(Command::conflict) {
+        Arguments::command().error(clap::error::ErrorKind::ArgumentConflict, reason).exit();
+    }
     let console = Console::new(arguments.global.quiet);
     let outcome = execute(arguments, &console, repeated(&words));
     console.finish();
@@ -197,7 +214,6 @@ fn execute(arguments: Arguments, console: &Console, command: String) -> Result<(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory as _;
 
     #[test]
     fn a_message_says_every_cause_once() {

@@ -44,7 +44,7 @@ impl ModelFile {
     pub(super) fn mismatch(&self, model: &Model<'_>, situation: &Situation) -> Option<String> {
         let made = &model.card().provenance;
         let made = [made.vehicle, made.gains, made.condition];
-        let flown = [&situation.vehicle, &situation.gains, &situation.condition].map(String::as_str);
+        let flown = [&situation.vehicle, situation.gains_name(), &situation.condition];
         let differs = made != flown;
         differs.then(|| format!("{}: made for {}, flown with {}", self.name(), made.join(" "), flown.join(" ")))
     }

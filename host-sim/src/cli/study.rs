@@ -42,6 +42,14 @@ enum Subject {
 }
 
 impl Study {
+    /// Why the arguments do not go together, if they do not.
+    pub(super) fn conflict(&self) -> Option<String> {
+        match &self.subject {
+            Subject::Draws(command) => command.conflict(),
+            _ => None,
+        }
+    }
+
     pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
         match self.subject {
             Subject::Lti(lti) => lti.run(invocation),

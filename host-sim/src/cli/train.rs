@@ -8,7 +8,7 @@ use anyhow::{Context as _, Result, anyhow, bail};
 use clap::Args;
 use impromptu_files::name::plain;
 use impromptu_flight::flight::Rates;
-use impromptu_sim::{flight_log::FlightLog, flights::Loop};
+use impromptu_sim::{controller::Controller, flight_log::FlightLog, flights::Loop};
 use impromptu_training::{
     AxisGates, LearnError, LearnSettings, Learned, Pipeline, Recipe, Trained, Validation, check_gates, files::model_files,
     in_words, learn::few_rows, observer::Observer as _, smoothing, supervised::Progress, write_model_files,
@@ -19,7 +19,7 @@ use super::{
     Invocation,
     configuration::checked,
     output::table,
-    situation::{closed_loop, milliseconds},
+    situation::{closed_loop, controller, flown_by, gains_conflict, milliseconds},
 };
 
 /// Arguments of `train`.
@@ -44,6 +44,9 @@ pub(super) struct Train {
     /// Gains of its position loop.
     #[arg(long, value_name = "NAME", default_value = "stock", requires = "vehicle")]
     gains: String,
+    /// Loop that flies it: se3, pid, mellinger or mellinger_feed_forward.
+    #[arg(long, value_name = "NAME", default_value = "se3", requires = "vehicle", value_parser = controller)]
+    controller: Controller,
     /// Condition of the validation flights.
     #[arg(long, value_name = "NAME|FILE.toml", default_value = "lab", requires = "vehicle")]
     condition: String,
@@ -152,6 +155,11 @@ impl Train {
         invocation.format.print(&trained, || text(&trained))
     }
 
+    /// Why the arguments do not go together, if they do not.
+    pub(super) fn conflict(&self) -> Option<String> {
+        gains_conflict(&self.gains, self.controller)
+    }
+
     /// Every file that is written must be writable, and none of those that are read.
     fn check_outputs(&self, invocation: &Invocation, folder: &Path) -> Result<()> {
         let named = [self.vehicle.as_deref(), Some(&self.condition)].into_iter().flatten().map(Path::new);
@@ -198,7 +206,8 @@ impl Train {
     }
 
     fn origin(&self, recipe: &Recipe) -> Result<Origin> {
-        let known = self.vehicle.as_ref().map(|vehicle| closed_loop(vehicle, &self.gains, &self.condition)).transpose()?;
+        let simulated = |vehicle| flown_by(closed_loop(vehicle, &self.gains, &self.condition)?, self.controller);
+        let known = self.vehicle.as_deref().map(simulated).transpose()?;
         let delay_s = match (self.delay_ms, &known) {
             (Some(delay), _) => delay / 1e3,
             (None, Some(closed_loop)) => closed_loop.condition.measurement_delay_s,

@@ -23,6 +23,25 @@ fn unknown_names_are_answered_with_the_known_ones() {
 }
 
 #[test]
+fn a_loop_is_refused_where_it_cannot_fly() {
+    let folder = Folder::new();
+    for (words, named) in [
+        ("fly --pil --controller pid", "--pil: the firmware flies its own loop, se3; leave out --controller pid"),
+        ("fly --trajectory circle --controller pid --gains soft", "--gains soft: --controller pid has its own gains"),
+        ("train --log a.csv --vehicle crazyflie --controller mellinger --gains soft", "--controller mellinger has its own gains"),
+        ("fly --trajectory circle --controller lqr", "known names: se3, pid, mellinger, mellinger_feed_forward"),
+    ] {
+        let run = folder.run(words);
+        assert_eq!((run.code, run.stdout.as_str()), (2, ""), "{words}: {}", run.stderr);
+        assert!(run.stderr.contains(named), "{words}: {}", run.stderr);
+    }
+    let named = ["--controller", "`pid`", "vehicle `hummingbird`", "0.5 kg"];
+    folder.refused("fly --trajectory circle --controller pid --vehicle hummingbird", &named);
+    let flown = folder.fine("fly --trajectory circle --controller pid");
+    assert!(flown.stdout.contains("crazyflie pid lab"), "{}", flown.stdout);
+}
+
+#[test]
 fn malformed_trajectories_are_refused_and_nothing_is_overwritten() {
     let folder = Folder::new();
     folder.write("out.csv", "precious");

@@ -50,6 +50,7 @@ pub(super) fn sections(
                 (key("dot comparison", "mean")) (key("ring comparison", "worst flight"))
                 (key("comparison", "not learned, or feedback alone")) (key("ridge", "ridge, linear"))
                 (key("network", "network lane")) (key("both-lanes", "network and feedback lane"))
+                (key("learned", "learned in flight"))
             }
         }, &reductions))
         (section("Every flight", html! {

@@ -29,11 +29,12 @@ pub(super) enum Ink {
     Ridge,
     Network,
     BothLanes,
+    Learned,
     Paper,
 }
 
 impl Ink {
-    const ALL: [(Self, &'static str); 11] = [
+    const ALL: [(Self, &'static str); 12] = [
         (Self::Text, "text"),
         (Self::Muted, "muted"),
         (Self::Grid, "grid"),
@@ -44,6 +45,7 @@ impl Ink {
         (Self::Ridge, "ridge"),
         (Self::Network, "network"),
         (Self::BothLanes, "both-lanes"),
+        (Self::Learned, "learned"),
         (Self::Paper, "paper"),
     ];
 

@@ -74,6 +74,7 @@ pub(crate) const fn colour_class(method: Method) -> &'static str {
         Family::Ridge => "ridge",
         Family::Network => "network",
         Family::BothLanes => "both-lanes",
+        Family::Learned => "learned",
     }
 }
 
@@ -85,5 +86,6 @@ pub(super) const fn ink(method: Method) -> Ink {
         Family::Ridge => Ink::Ridge,
         Family::Network => Ink::Network,
         Family::BothLanes => Ink::BothLanes,
+        Family::Learned => Ink::Learned,
     }
 }

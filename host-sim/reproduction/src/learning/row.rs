@@ -3,10 +3,10 @@
 //! *in* a case and its flights; *out* numbers with the names that the JSON document has; *never* a reduction without the
 //! centimetres that are left; *source* none.
 
-use impromptu_sim::flights::reduction;
+use impromptu_sim::{flights::reduction, learned::Flown};
 use serde::Serialize;
 
-use super::{cases::Case, flown::Flown};
+use super::cases::Case;
 
 /// How long was learned before the flights that are judged.
 #[derive(Clone, Copy, Debug, PartialEq)]

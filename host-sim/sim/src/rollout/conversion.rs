@@ -8,7 +8,7 @@ use impromptu_flight::{
 use nalgebra::Vector3;
 
 use crate::{
-    plant::{Vehicle, VehicleError},
+    plant::{PositionGains as VehicleGains, Vehicle, VehicleError},
     trajectory::Sample,
 };
 
@@ -26,15 +26,16 @@ pub fn settings(vehicle: &Vehicle, gains: &str) -> Result<Settings, VehicleError
             torque_coefficient: vehicle.torque_coefficient as f32,
             max_rotor_speed: vehicle.rotor_speed_max as f32,
         },
-        position: PositionGains {
-            kp: single(position.proportional),
-            kd: single(position.derivative),
-            ki: [0.0; 3],
-            integral_limit: 0.0,
-        },
+        position: position_gains(&position),
         attitude: AttitudeGains { kp: vehicle.attitude_gains.proportional as f32, kd: vehicle.attitude_gains.derivative as f32 },
         rates: Rates::default(),
     })
+}
+
+/// Gains as the firmware's, without an integral.
+pub fn position_gains(gains: &VehicleGains) -> PositionGains {
+    let single = |values: [f64; 3]| values.map(|value| value as f32);
+    PositionGains { kp: single(gains.proportional), kd: single(gains.derivative), ki: [0.0; 3], integral_limit: 0.0 }
 }
 
 /// A sample as the firmware's setpoint.

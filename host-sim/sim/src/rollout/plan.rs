@@ -8,6 +8,7 @@ use impromptu_firmware::{
 use impromptu_flight::replay::Recorded;
 
 use crate::{
+    controller::ControllerError,
     flight_log::FlightLog,
     plant::{Variation, VehicleError},
     trajectory::Trajectory,
@@ -111,6 +112,9 @@ pub enum RolloutError {
         /// The loop's rate, Hz.
         expected: f64,
     },
+    /// The loop is not for this vehicle.
+    #[error("controller {0}")]
+    Controller(#[from] ControllerError),
     /// Unknown gains.
     #[error(transparent)]
     Vehicle(#[from] VehicleError),

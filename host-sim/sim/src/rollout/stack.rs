@@ -13,9 +13,10 @@ use nalgebra::Vector3;
 
 use super::{
     faults::FaultyFlight,
+    loops::Loops,
     plan::{FlightPlan, RolloutError},
 };
-use crate::{condition::Condition, plant::Vehicle};
+use crate::{condition::Condition, controller::Controller, plant::Vehicle};
 
 /// A flight stack, on the ground or in flight.
 pub trait FlightStack {
@@ -69,10 +70,12 @@ pub(super) struct Software<'a> {
 impl<'a> Software<'a> {
     pub(super) fn new(
         vehicle: &Vehicle,
+        controller: Controller,
         settings: &Settings,
         condition: &Condition,
         plan: &FlightPlan<'a>,
     ) -> Result<Self, RolloutError> {
+        controller.check(vehicle)?;
         settings.check().map_err(|refusal| RolloutError::Airframe(format!("`{}`: {refusal}", vehicle.name)))?;
         let mut flight = Flight::empty();
         flight.configure(settings);
@@ -83,11 +86,11 @@ impl<'a> Software<'a> {
             }
         }
         let delay = condition.command_delay_ticks(settings.rates.control_hz.into());
-        Ok(Self { inside: FaultyFlight::new(flight, plan.loop_gain, delay), scratch: Scratch::new(), learning: None })
+        let loops = Loops::new(controller, vehicle, &settings.rates, delay);
+        let inside = FaultyFlight::with(flight, plan.loop_gain, loops);
+        Ok(Self { inside, scratch: Scratch::new(), learning: None })
     }
-}
 
-impl<'a> Software<'a> {
     /// The same, which learns what it does not know yet.
     pub(super) fn learning(self, learning: &'a mut FlightLearning) -> Self {
         learning.restart();

@@ -129,6 +129,11 @@ pub(super) struct Draws {
 }
 
 impl Draws {
+    /// Why the arguments do not go together, if they do not.
+    pub(in crate::cli) fn conflict(&self) -> Option<String> {
+        self.situation.conflict()
+    }
+
     pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
         let (closed_loop, ranges) = (self.situation.closed_loop()?, self.draw.ranges()?);
         let seed = invocation.configuration.seed();

@@ -1,16 +1,19 @@
-//! Flights that learn.
+//! Flights that learn, and what is left of the error.
 //!
-//! *in* a loop, a model or none, strokes; *out* their errors beside the baseline's of the same seeds; *never* a baseline that flew
-//! another vehicle or another air; *source* none.
+//! *in* a loop, a model or none, trajectories; *out* their errors beside the baseline's of the same seeds; *never* a baseline that
+//! flew another vehicle or another air; *source* ours ([`impromptu_flight::learning`]).
 
 use impromptu_firmware::{adapter::Lanes, learning::Parts, model::Model};
 use impromptu_flight::learning::FlightLearning;
-use impromptu_sim::{
+#[cfg(feature = "threads")]
+use rayon::prelude::*;
+
+use crate::{
+    flight_log::{FlightLog, LogRow},
     flights::Loop,
     rollout::{FlightPlan, RolloutError},
     trajectory::Trajectory,
 };
-use rayon::prelude::*;
 
 /// Strokes that are not judged where they are flown one after another.
 const FIRST: usize = 4;
@@ -22,8 +25,8 @@ const OTHER_SEEDS: u64 = 1 << 32;
 pub struct Learned<'a> {
     /// The loop that is flown.
     pub closed_loop: &'a Loop,
-    /// The model before it, with both lanes, if there is one.
-    pub model: Option<&'a Model<'a>>,
+    /// The model before it and its lanes, if there is one.
+    pub model: Option<(&'a Model<'a>, Lanes)>,
     /// Parts that learn and act.
     pub parts: Parts,
     /// Of the first flight; each has its own.
@@ -59,8 +62,7 @@ impl<'a> Learned<'a> {
         seed: u64,
         learning: &mut FlightLearning,
     ) -> Result<f64, RolloutError> {
-        let model = self.model.map(|model| (model, Lanes::BOTH));
-        let plan = FlightPlan { model, guard: closed_loop.guard, ..FlightPlan::new(trajectory, seed) };
+        let plan = FlightPlan { model: self.model, guard: closed_loop.guard, ..FlightPlan::new(trajectory, seed) };
         Ok(closed_loop.fly_learning(&plan, learning)?.rms)
     }
 }
@@ -101,32 +103,41 @@ pub fn one_after_another(learned: &Learned<'_>, strokes: &[Trajectory], later_s:
     })
 }
 
-/// Each stroke by itself, with what so many seconds of other strokes taught.
+/// What so many seconds of motion of strokes teach, flown one after another, and how long they took with their rests, s.
 ///
 /// # Errors
 /// If a stroke cannot be flown.
-pub fn after(learned: &Learned<'_>, taught: u32, teach: &[Trajectory], strokes: &[Trajectory]) -> Result<Flown, RolloutError> {
+pub fn taught(learned: &Learned<'_>, motion_s: u32, strokes: &[Trajectory]) -> Result<(FlightLearning, f64), RolloutError> {
     let mut learning = learned.nothing()?;
-    let mut left = f64::from(taught);
+    let mut left = f64::from(motion_s);
     let mut flown = 0.0;
-    for (stroke, seed) in teach.iter().zip(learned.seed.wrapping_add(OTHER_SEEDS)..) {
+    for (stroke, seed) in strokes.iter().zip(learned.seed.wrapping_add(OTHER_SEEDS)..) {
         if left <= 0.0 {
             break;
         }
         let mut stroke = stroke.clone();
-        let ticks = stroke.scored.start + ((left * stroke.rate_hz) as usize).min(stroke.scored.len());
+        let ticks = (left * stroke.rate_hz) as usize;
         left -= stroke.scored.len() as f64 / stroke.rate_hz;
-        if left < 0.0 {
-            stroke.samples.truncate(ticks);
-            stroke.scored.end = ticks;
+        if ticks < stroke.scored.len() {
+            stroke.scored.end = stroke.scored.start + ticks;
+            stroke.samples.truncate(stroke.scored.end);
         }
         flown += seconds(&stroke);
         learned.fly(learned.closed_loop, &stroke, seed, &mut learning)?;
     }
+    Ok((learning, flown))
+}
+
+/// Each stroke by itself, with what so many seconds of other strokes taught; it goes on learning.
+///
+/// # Errors
+/// If a stroke cannot be flown.
+pub fn after(learned: &Learned<'_>, motion_s: u32, teach: &[Trajectory], strokes: &[Trajectory]) -> Result<Flown, RolloutError> {
+    let (learning, flown) = taught(learned, motion_s, teach)?;
     let (errors, forgotten) = each(learned, learned.closed_loop, &learning, strokes)?;
     let baseline = learned.closed_loop.errors(strokes, None, 1.0, learned.seed)?;
-    flown += strokes.iter().map(seconds).sum::<f64>();
-    Ok(Flown { baseline, errors, first: None, seconds: flown, forgotten })
+    let seconds = flown + strokes.iter().map(seconds).sum::<f64>();
+    Ok(Flown { baseline, errors, first: None, seconds, forgotten })
 }
 
 /// Each stroke by itself with what was learned.
@@ -141,6 +152,57 @@ fn each(
         let error = learned.fly(closed_loop, stroke, learned.seed.wrapping_add(index as u64), &mut own)?;
         Ok((error, u32::from(own.forgotten() - learning.forgotten())))
     };
-    let flown: Vec<(f64, u32)> = strokes.par_iter().enumerate().map(fly).collect::<Result<_, RolloutError>>()?;
+    #[cfg(feature = "threads")]
+    let strokes = strokes.par_iter();
+    #[cfg(not(feature = "threads"))]
+    let strokes = strokes.iter();
+    let flown: Vec<(f64, u32)> = strokes.enumerate().map(fly).collect::<Result<_, RolloutError>>()?;
     Ok((flown.iter().map(|(error, _)| *error).collect(), flown.iter().map(|(_, forgotten)| forgotten).sum()))
+}
+
+/// Root mean square error over flights, second by second in motion: points (s, m) without learning and with it, from nothing. Each
+/// flight flies strokes of its own one after another; rests between them are left out.
+///
+/// # Errors
+/// If a stroke cannot be flown.
+pub fn second_by_second(
+    closed_loop: &Loop,
+    flights: &[Vec<Trajectory>],
+    seconds: usize,
+    seed: u64,
+) -> Result<[Vec<(f64, f64)>; 2], RolloutError> {
+    let fly = |strokes: &Vec<Trajectory>| {
+        let mut learning = closed_loop.learning()?;
+        let mut squares = [Vec::new(), Vec::new()];
+        for (stroke, seed) in strokes.iter().zip(seed..) {
+            let plan = FlightPlan { log: true, ..FlightPlan::new(stroke, seed) };
+            let without = closed_loop.fly(std::slice::from_ref(&plan))?.pop().unwrap_or_default();
+            let with = closed_loop.fly_learning(&plan, &mut learning)?;
+            for (squares, record) in squares.iter_mut().zip([without, with]) {
+                squares.extend(of_each_second(stroke, &record.log.unwrap_or_default()));
+            }
+        }
+        Ok(squares)
+    };
+    #[cfg(feature = "threads")]
+    let flights = flights.par_iter();
+    #[cfg(not(feature = "threads"))]
+    let flights = flights.iter();
+    let flown: Vec<[Vec<f64>; 2]> = flights.map(fly).collect::<Result<_, RolloutError>>()?;
+    let point = |index: usize, second: usize| {
+        let squares: Vec<f64> = flown.iter().filter_map(|squares| squares[index].get(second).copied()).collect();
+        (second as f64 + 0.5, (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt())
+    };
+    Ok([0, 1].map(|index| (0..seconds).map(|second| point(index, second)).collect()))
+}
+
+/// Mean square of the error in each whole second of the drawn part, m².
+fn of_each_second(stroke: &Trajectory, log: &FlightLog) -> Vec<f64> {
+    let square = |row: &LogRow| {
+        let position = row.true_position.unwrap_or(row.measured_position);
+        (0..3).map(|axis| (position[axis] - row.desired.position[axis]).powi(2)).sum::<f64>()
+    };
+    let rows = log.rows.get(stroke.scored.clone()).unwrap_or_default();
+    let second = (stroke.rate_hz.round() as usize).max(1);
+    rows.chunks_exact(second).map(|rows| rows.iter().map(square).sum::<f64>() / second as f64).collect()
 }
