@@ -319,3 +319,6 @@ pub fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0usize), |(sum, count), value| (sum + value, count + 1));
     sum / count as f64
 }
+
+#[cfg(test)]
+mod tests;

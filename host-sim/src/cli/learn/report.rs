@@ -92,7 +92,7 @@ impl Replayed {
         };
         let rate = if *measured_rate { "from the logs" } else { "the difference of the measured value, low-passed over a tick" };
         format!(
-            "Response: second order, gain {:.2}, {:.2} rad/s, damping {:.2}, delay {:.0} ms; {from}.\n\
+            "Response: second order, gain {:.2}, {:.2} rad/s, damping {:.2}, delay {:.0} ms;\n{from}.\n\
              Learner: {rate_hz:.1} ticks a second, the log has {log_hz:.1} rows; rate of change {rate}.\n",
             response.gain,
             response.frequency,
