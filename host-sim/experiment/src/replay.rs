@@ -5,8 +5,8 @@
 //!
 //! It is a prediction, nothing was flown: the error that is left is the recorded one and what the guessed response makes of the
 //! correction, `e + G c`. The learner measures that, and so learns and acts as it would in a linear loop with this response; a
-//! loop that answers otherwise, saturates, or is disturbed otherwise, is left with another error. [`Replay::of`] says what is left
-//! if the loop is faster or slower than guessed while the learner holds to its guess.
+//! loop that answers otherwise, saturates, or is disturbed otherwise, is left with another error. [`Replay::otherwise`] says how
+//! much is left if the loop is faster or slower than guessed while the learner holds to its guess.
 //!
 //! | ticks of a flight | counted and learned from |
 //! |---|---|
@@ -72,8 +72,8 @@ pub enum ReplayError {
     Unidentified,
     /// A response that is too fast for the log.
     #[error(
-        "a response with {frequency:.2} rad/s and a damping of {damping:.2} needs more than {log_hz:.1} rows a second; log faster, \
-         or give a slower one with --frequency"
+        "a response with {frequency:.2} rad/s and a damping of {damping:.2} needs more than {log_hz:.1} rows a second; log \
+         faster, or give a slower one with --frequency"
     )]
     Fast {
         /// rad/s.

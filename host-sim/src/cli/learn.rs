@@ -144,7 +144,8 @@ impl Learn {
             let sound = error <= bound;
             if !sound {
                 invocation.console.note(&format!(
-                    "{}: up to {error:.3} from the reference, beside {bound:.3} in a usual log at most: the loop broke down; left out",
+                    "{}: up to {error:.3} from the reference, beside {bound:.3} in a usual log at most: the loop broke down; \
+                     left out",
                     flight.name
                 ));
             }
