@@ -1,7 +1,8 @@
 //! Flights of a loop, replayed through the learner as if it had flown: what it would have left of each next one.
 //!
 //! *in* logs of flights without a correction, in the order in which they were flown; *out* for each the error as recorded and as
-//! predicted; *never* anything of a flight in what is predicted for it with what came before; *source* ours.
+//! predicted; *never* anything that was learned from a flight in what is predicted for it with what came before, but for the
+//! response where that is found from the first two; *source* ours.
 //!
 //! It is a prediction, nothing was flown: the error that is left is the recorded one and what the guessed response makes of the
 //! correction, `e + G c`. The learner measures that, and so learns and acts as it would in a linear loop with this response; a
@@ -70,16 +71,19 @@ pub enum ReplayError {
          --frequency, --damping and --delay-ms"
     )]
     Unidentified,
-    /// A response that is too fast for the log.
+    /// A response for which there are no ticks.
     #[error(
-        "a response with {frequency:.2} rad/s and a damping of {damping:.2} needs more than {log_hz:.1} rows a second; log \
-         faster, or give a slower one with --frequency"
+        "a response of {frequency:.2} rad/s, damping {damping:.2} and delay {delay_ms:.0} ms cannot be followed in a log of \
+         {log_hz:.1} rows a second: three lags are to be about 80 ticks, a row four at most, and the delay 32; log faster, or give \
+         another response with --frequency, --damping and --delay-ms"
     )]
-    Fast {
+    NoTicks {
         /// rad/s.
         frequency: f64,
         /// Damping ratio.
         damping: f64,
+        /// ms.
+        delay_ms: f64,
         /// Rows a second.
         log_hz: f64,
     },
@@ -265,9 +269,10 @@ impl Replay {
                 (response, Some(misfit), shown.iter().map(|flight| flight.name.clone()).collect())
             }
         };
-        let fast = ReplayError::Fast { frequency: response.frequency, damping: response.damping, log_hz };
-        let rate_hz = response.rate_hz(log_hz).ok_or_else(|| fast.clone())?;
-        let answer = response.response(rate_hz).ok_or(fast)?;
+        let SecondOrder { frequency, damping, delay_s, .. } = response;
+        let no_ticks = ReplayError::NoTicks { frequency, damping, delay_ms: 1e3 * delay_s, log_hz };
+        let rate_hz = response.rate_hz(log_hz).ok_or_else(|| no_ticks.clone())?;
+        let answer = response.response(rate_hz).ok_or(no_ticks)?;
         let needed = 3.0 * UNKNOWN as f64 / rate_hz;
         for flight in flights {
             let seconds =
@@ -277,13 +282,12 @@ impl Replay {
             }
         }
         // Bounded by what the trajectories reach over: a correction is no journey of its own.
-        let learners = (0..first.tracks.len()).map(|axis| {
-            let extents = flights.iter().filter_map(|flight| flight.tracks.get(axis)).map(|track| extent(&track.reference));
-            let correction = extents.fold(0.0, f64::max);
-            let limits = Limits { correction: correction as f32, feedback: (FEEDBACK * correction) as f32 };
-            (Learner::new(answer, rate_hz as f32, 0.0), limits)
-        });
-        let closed_loop = Loop { rate_hz, answer, learners: learners.collect() };
+        let extents = flights.iter().flat_map(|flight| &flight.tracks).map(|track| extent(&track.reference));
+        let bound = extents.fold(0.0, f64::max);
+        let limits = Limits { correction: bound as f32, feedback: (FEEDBACK * bound) as f32 };
+        let learner = Learner::new(answer, rate_hz as f32, 0.0);
+        let learners = vec![(learner, limits); first.tracks.len()];
+        let closed_loop = Loop { rate_hz, answer, learners };
         let signals: Vec<(&str, Vec<Signals>)> = flights
             .iter()
             .map(|flight| (flight.name.as_str(), flight.tracks.iter().map(|track| Signals::of(track, rate_hz)).collect()))

@@ -131,7 +131,7 @@ fn what_is_wrong_with_a_log_and_what_to_do_is_said() {
     folder.refused(&format!("learn --log {good}"), &["two sound flights"]);
     folder.refused(
         &format!("learn --log {good} {good} --frequency 200 --damping 0.7 --delay-ms 0"),
-        &["200.00 rad/s", "25.0 rows a second", "log faster"],
+        &["200.00 rad/s", "25.0 rows a second", "log faster", "--frequency"],
     );
     assert!(!folder.path("out/learn.html").exists());
 }
