@@ -67,7 +67,7 @@ pub enum ReplayError {
     },
     /// No response fits.
     #[error(
-        "no response can be found from the first logs: they are too short or their rate is too low; give longer logs, or \
+        "no response can be found from the first logs: each is too fast for their rate; log faster, or give another one with \
          --frequency, --damping and --delay-ms"
     )]
     Unidentified,

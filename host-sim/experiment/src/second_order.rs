@@ -80,7 +80,7 @@ impl Known {
     }
 
     /// The response that lies closest to these tracks, and by how much it misses them, RMS in their unit. `None` if none is
-    /// slow enough for their rate and fast enough for their length.
+    /// slow enough for their rate.
     pub fn identify(&self, tracks: &[&Track]) -> Option<(SecondOrder, f64)> {
         let best = |candidates: Vec<SecondOrder>| {
             let fits = candidates.into_iter().filter_map(|candidate| Some((candidate, candidate.misfit(tracks)?)));
@@ -115,8 +115,8 @@ impl SecondOrder {
         Response::second_order(gain, frequency, damping, delay_s, rate_hz as f32)
     }
 
-    /// RMS distance between what it makes of the references and what was measured, after the first 80 ticks; the loop rested
-    /// where it was measured first.
+    /// RMS distance between what it makes of the references and what was measured, after the first 80 ticks or the first third;
+    /// the loop rested where it was measured first.
     pub fn misfit(&self, tracks: &[&Track]) -> Option<f64> {
         let (mut sum, mut count) = (0.0, 0usize);
         for track in tracks {
@@ -124,15 +124,14 @@ impl SecondOrder {
             let response = self.response(rate_hz)?;
             let reference = resampled(&track.reference, track.period_s, rate_hz);
             let measured = resampled(&track.measured, track.period_s, rate_hz);
-            if measured.len() < 3 * TICKS as usize {
-                return None;
-            }
+            // A log that is too short for a replay says so, once the response is known; it must not decide which one is.
+            let skipped = (TICKS as usize).min(measured.len() / 3);
             let rest = measured.first().copied().unwrap_or(0.0) / self.gain;
             let mut filter = Filter::at_rest(&response, rest as f32);
             let delayed = std::iter::repeat_n(rest, 1 + response.delay()).chain(reference);
             for (tick, (input, measured)) in delayed.zip(&measured).enumerate() {
                 let output = f64::from(filter.step(&response, input as f32));
-                if tick >= TICKS as usize {
+                if tick >= skipped {
                     sum += (output - measured).powi(2);
                     count += 1;
                 }

@@ -2,16 +2,16 @@
 
 use crate::program::Folder;
 
-/// Flights of a Crazyflie (BSD-3-Clause, see `reproduction/data/nanobench`), in an order of no meaning.
+/// Flights of a Crazyflie (BSD-3-Clause, see `reproduction/data/nanobench`), in a drawn order.
 const FLIGHTS: [&str; 8] = [
-    "B2_circle_slow_rep1",
-    "B7_oval_slow_rep2",
-    "B9_trefoil_medium_rep1",
-    "B10_lissajous_slow_rep1",
-    "B3_figure8_medium_rep1",
     "B8_star_medium_rep1",
+    "B7_oval_slow_rep2",
+    "B9_trefoil_slow_rep1",
+    "B3_figure8_slow_rep1",
+    "B10_lissajous_fast_rep1",
+    "B5_helix_fast_rep1",
+    "B2_circle_slow_rep1",
     "B5_helix_medium_rep1",
-    "B3_figure8_fast_rep1",
 ];
 
 /// Copies the flights into the folder; returns their names for a command line.
@@ -38,11 +38,13 @@ fn the_errors_of_real_flights_would_have_melted() {
     assert_eq!((flights.len(), number(0, "reduction_percent")), (8, 0.0));
     for flight in 5..8 {
         let (recorded, predicted) = (number(flight, "recorded"), number(flight, "predicted"));
-        assert!(predicted < 0.25 * recorded && recorded > 20.0, "{}", flights[flight]);
+        assert!(predicted < 0.35 * recorded && recorded > 20.0, "{}", flights[flight]);
     }
+    let later = |name: &str| found["summaries"][1][name].as_f64().unwrap();
+    assert!(later("predicted") < 0.25 * later("recorded"), "{found}");
     assert!(number(7, "learned_before_min") > 2.0 && found["learned_min"].as_f64() > Some(2.4), "{found}");
     for error in found["otherwise"].as_array().unwrap() {
-        assert!(error.as_f64().unwrap() < 0.35 * found["summaries"][1]["recorded"].as_f64().unwrap(), "{found}");
+        assert!(error.as_f64().unwrap() < 0.35 * later("recorded"), "{found}");
     }
     let run = folder.fine(&format!("learn --log {logs} --out page"));
     for part in [
@@ -77,7 +79,7 @@ fn columns_are_named_where_they_are_not_known_and_asked_for_where_two_could_be_m
     let list = |kind: &str| names.iter().map(|name| format!("{kind}-{name}.csv")).collect::<Vec<_>>().join(" ");
     let run = folder.run(&format!("learn --log {}", list("two")));
     assert_eq!((run.code, run.stdout.as_str()), (2, ""), "{}", run.stderr);
-    for part in ["two-B2_circle_slow_rep1.csv", "`px` and `est_stateEstimate_x`", "--columns t,sp_ctrltarget_x,px"] {
+    for part in ["two-B8_star_medium_rep1.csv", "`px` and `est_stateEstimate_x`", "--columns t,sp_ctrltarget_x,px"] {
         assert!(run.stderr.contains(part), "`{part}` is missing in {}", run.stderr);
     }
     let settled = format!("learn --log {} --columns t,sp_ctrltarget_x,px t,sp_ctrltarget_y,py --format json", list("two"));
@@ -105,7 +107,7 @@ fn what_is_wrong_with_a_log_and_what_to_do_is_said() {
     };
     folder.write("nan.csv", edited(40, "1.56,NaN,0,0,0"));
     folder.write("far.csv", edited(40, "1.56,3e6,0,0,0"));
-    folder.write("short.csv", lines[..90].join("\n"));
+    folder.write("short.csv", lines[..76].join("\n"));
     folder.write("gap.csv", [&lines[..100], &lines[140..]].concat().join("\n"));
     folder.write("column.csv", text.replacen("py", "north", 1).replacen("px", "east", 1));
     folder.write(
@@ -122,9 +124,9 @@ fn what_is_wrong_with_a_log_and_what_to_do_is_said() {
     let refused = |bad: &str, named: &[&str]| folder.refused(&format!("learn --log {good} {bad}"), named);
     refused("nan.csv", &["nan.csv, line 41", "`px`", "NaN", "drop or repair"]);
     refused("far.csv", &["far.csv, line 41", "`px`", "-1e5 to 1e5"]);
-    refused("short.csv", &["short: 3.6 s are too short", "at least"]);
+    refused("short.csv", &["short: 3.0 s are too short", "at least"]);
     refused("gap.csv", &["gap.csv", "row 99", "resample"]);
-    refused("column.csv", &["column.csv", "`measured`", "t, east, north", "--columns"]);
+    refused("column.csv", &["column.csv", "`reference`", "t, east, north", "--columns"]);
     refused("slow.csv", &["slow.csv", "rows are too few"]);
     refused("absent.csv", &["absent.csv"]);
     folder.refused(&format!("learn --log still.csv {good}"), &["still: the reference does not move", "--frequency"]);
