@@ -8,9 +8,11 @@ use impromptu_firmware::learning::{Filter, Response};
 use impromptu_training::track::Track;
 use serde::Serialize;
 
-/// Learner's ticks that a response should have settled in, and so many lags that it takes to.
+/// Learner's ticks that a response should have settled in.
 const TICKS: f64 = 80.0;
+/// It takes so many lags, or, if it swings, so many of the time constants in which the swing decays.
 const LAGS: f64 = 3.0;
+const DECAYS: f64 = 2.0;
 /// The learner runs at most so many times as fast as the log.
 const FASTEST: f64 = 4.0;
 
@@ -97,10 +99,15 @@ impl SecondOrder {
         2.0 * self.damping / self.frequency + self.delay_s
     }
 
-    /// The learner's rate for a log of this one, Hz: the log's own, or a multiple or a whole part of it, so that three lags are
-    /// about 80 ticks. `None` if that is more than four times the log's.
+    /// Until it has settled, nearly, s.
+    pub fn settling_s(&self) -> f64 {
+        (LAGS * self.lag_s()).max(DECAYS / (self.damping * self.frequency) + self.delay_s)
+    }
+
+    /// The learner's rate for a log of this one, Hz: the log's own, or a multiple or a whole part of it, so that the response has
+    /// settled in about 80 ticks. `None` if that is more than four times the log's.
     pub fn rate_hz(&self, log_hz: f64) -> Option<f64> {
-        let wanted = TICKS / (LAGS * self.lag_s());
+        let wanted = TICKS / self.settling_s();
         let ratio = wanted / log_hz;
         if !(ratio <= FASTEST && ratio > 0.0) {
             return None;
@@ -141,7 +148,7 @@ impl SecondOrder {
     }
 }
 
-/// Values at another rate, by lines between them.
+/// Values at another rate, by lines between them: a tick between two rows knows a share of the row to come.
 pub(crate) fn resampled(values: &[f64], period_s: f64, rate_hz: f64) -> Vec<f64> {
     let step = 1.0 / (period_s * rate_hz);
     let last = values.len().saturating_sub(1);

@@ -42,8 +42,9 @@ A log is a CSV file with a header, one row a tick at a uniform rate; lost rows a
 that the log does not have is the difference of the measured value, low-passed over a tick. Cut the log to the part in which the
 loop is flown: no take-off, no landing.
 
-The learner runs at the log's rate, or at a multiple or part of it, so that three lags of the response are about 80 ticks; values
-between rows are interpolated linearly. What of the response is not given is found from the first two logs.
+The learner runs at the log's rate, or at a multiple or part of it, so that the response has settled in about 80 ticks; values
+between rows are interpolated linearly, so that such a tick knows a share of the row to come. What of the response is not given is
+found from the first two logs. One response stands for all axes; if it misses the logs by much, the prediction is worth little.
 
 Written into --out: learn.html, a page with a figure in which the predicted error melts flight after flight.
 

@@ -161,8 +161,8 @@ impl Replayed {
     pub(super) fn study(&self, seed: u64, command: &str) -> Study {
         let unit = self.unit;
         let mut study = Study::new("What learning in flight would have left: a prediction", command, seed);
-        study.note(SECTION, &self.response());
-        study.note(SECTION, &self.caution());
+        study.note(SECTION, &self.response().replace('\n', " "));
+        study.note(SECTION, &self.caution().replace('\n', " "));
         let curve = |label: &str, of: &dyn Fn(&Predicted) -> f64| {
             Curve::line_and_dots(label, self.replay.flights.iter().zip(1..).map(|(flight, at)| (f64::from(at), of(flight))))
         };
