@@ -74,8 +74,8 @@ pub enum ReplayError {
     /// A response for which there are no ticks.
     #[error(
         "a response of {frequency:.2} rad/s, damping {damping:.2} and delay {delay_ms:.0} ms cannot be followed in a log of \
-         {log_hz:.1} rows a second: it is to settle in about 80 ticks, of which a row is four at most, and the delay 32; log faster, or give \
-         another response with --frequency, --damping and --delay-ms"
+         {log_hz:.1} rows a second: it is to settle in about 80 ticks, of which a row is four at most, and the delay 32; log \
+         faster, or give another response with --frequency, --damping and --delay-ms"
     )]
     NoTicks {
         /// rad/s.
