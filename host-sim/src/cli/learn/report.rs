@@ -46,7 +46,7 @@ impl Summary {
         let (recorded, predicted) =
             (mean(flights.iter().map(|flight| flight.recorded)), mean(flights.iter().map(|flight| flight.predicted)));
         Some(Self {
-            flights: if first == last { format!("{first}") } else { format!("{first} to {last}") },
+            flights: if first == last { format!("flight {first}") } else { format!("flights {first} to {last}") },
             recorded,
             predicted,
             reduction_percent: 100.0 * (1.0 - predicted / recorded),
@@ -146,7 +146,7 @@ impl Replayed {
         );
         for summary in &self.summaries {
             text += &format!(
-                "flights {}: recorded {}, predicted {} {unit}; reduction {} %, worst flight {} %\n",
+                "{}: recorded {}, predicted {} {unit}; reduction {} %, worst flight {} %\n",
                 summary.flights,
                 number(summary.recorded, 2),
                 number(summary.predicted, 2),
