@@ -9,7 +9,11 @@
 //! | layer | modules | what they hold |
 //! |---|---|---|
 //! | 1 | `evaluation` | flights of every method over the test strokes |
+//! | 1 | `second_order` | a rough response of a loop, from its logs |
 //! | 2 | `demo` | the whole run, loop by loop |
+//! | 2 | `replay` | logs of any loop through the learner: what it would have left of each next flight |
 
 pub mod demo;
 pub mod evaluation;
+pub mod replay;
+pub mod second_order;

@@ -17,7 +17,7 @@ use impromptu_sim::{
 };
 use impromptu_training::{
     FlightSet, Purpose, Recipe,
-    channel::{AXES, Channel, of_logs, read},
+    channel::{AXES, Channel, largest_distance, of_logs, read},
     largest_sound_error,
     observer::Observer as _,
 };
@@ -211,13 +211,8 @@ impl Diagnose {
 
 /// Largest distance between measured value and reference over a log, all its channels together.
 fn largest_error(channels: &[Channel]) -> f64 {
-    let mut squares: Vec<f64> = Vec::new();
-    for segment in channels.iter().flat_map(|channel| &channel.record.segments) {
-        squares.resize(squares.len().max(segment.measured.len()), 0.0);
-        let errors = segment.measured.iter().zip(&segment.reference).map(|(measured, reference)| measured - reference);
-        squares.iter_mut().zip(errors).for_each(|(square, error)| *square += error * error);
-    }
-    squares.into_iter().fold(0.0, f64::max).sqrt()
+    let segments = channels.iter().flat_map(|channel| &channel.record.segments);
+    largest_distance(segments.map(|segment| (segment.measured.as_slice(), segment.reference.as_slice())))
 }
 
 impl Test {

@@ -9,6 +9,7 @@ mod demo;
 mod diagnose;
 mod evaluate;
 mod fly;
+mod learn;
 mod model_file;
 mod output;
 mod processor;
@@ -34,6 +35,8 @@ use self::{configuration::Configuration, output::Format, progress::Console};
 
 /// Exit code: a file was refused or a step failed.
 const FAILED: u8 = 1;
+/// Exit code: the arguments leave open what is meant, as a file shows.
+const WRONG_ARGUMENTS: u8 = 2;
 
 const EXAMPLES: &str = "\
 Without a command the whole demo runs: flights, training, quantisation, export, test flights, report.
@@ -49,6 +52,7 @@ Examples:
   host-sim collect --condition lab --flights 20 --out logs
   host-sim collect --condition lab --dither 0.01 --out dithered
   host-sim diagnose --log logs/*.csv
+  host-sim learn --log monday.csv tuesday.csv wednesday.csv
   host-sim train --log logs/*.csv --dithered dithered/*.csv --vehicle crazyflie --out models
   host-sim fly --model models/model.impromptu --trajectory figure8 --log figure8.csv
   host-sim evaluate --model models/model.impromptu --speed 1,1.7
@@ -95,6 +99,8 @@ enum Command {
     Collect(collect::Collect),
     /// Says of a loop, from its logs or from a test in the simulator, whether an add-on will help, and how much.
     Diagnose(diagnose::Diagnose),
+    /// Replays logs of any loop through the learner: predicts what it would have left of each next flight's error.
+    Learn(learn::Learn),
     /// Makes a model from flight logs, simulated or real.
     Train(train::Train),
     /// Flies a trajectory with the baseline and with a model.
@@ -170,7 +176,7 @@ where
         Err(error) => {
             // Nothing can be done if even that cannot be written.
             let _ = writeln!(std::io::stderr(), "error: {}", line(&message(&error)));
-            ExitCode::from(FAILED)
+            ExitCode::from(if learn::leaves_open(&error) { WRONG_ARGUMENTS } else { FAILED })
         }
     }
 }
@@ -202,6 +208,7 @@ fn execute(arguments: Arguments, console: &Console, command: String) -> Result<(
         None => demo::run(&invocation),
         Some(Command::Collect(command)) => command.run(&invocation),
         Some(Command::Diagnose(command)) => command.run(&invocation),
+        Some(Command::Learn(command)) => command.run(&invocation),
         Some(Command::Train(command)) => command.run(&invocation),
         Some(Command::Fly(command)) => command.run(&invocation),
         Some(Command::Evaluate(command)) => command.run(&invocation),

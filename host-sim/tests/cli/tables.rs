@@ -6,7 +6,7 @@ use crate::program::Folder;
 fn help_names_every_command_and_the_columns_of_a_log() {
     let folder = Folder::new();
     let help = folder.fine("--help");
-    for command in ["collect", "train", "fly", "evaluate", "report", "trajectory"] {
+    for command in ["collect", "learn", "train", "fly", "evaluate", "report", "trajectory"] {
         assert!(help.stdout.contains(&format!("\n  {command} ")), "{command}");
         let own = folder.fine(&format!("{command} --help")).stdout;
         assert!(own.contains("Example") && own.contains("--seed"), "{command}");

@@ -71,6 +71,17 @@ fn fresh(time: &[f64], reference: &[f64], measured: &[f64], age_s: f64) -> Resul
     Record::new(&time[..later.len()], &reference[..later.len()], &later)
 }
 
+/// Largest distance between two paths; each pair is an axis of them.
+pub fn largest_distance<'a>(axes: impl Iterator<Item = (&'a [f64], &'a [f64])>) -> f64 {
+    let mut squares: Vec<f64> = Vec::new();
+    for (path, other) in axes {
+        squares.resize(squares.len().max(path.len()), 0.0);
+        let errors = path.iter().zip(other).map(|(value, other)| value - other);
+        squares.iter_mut().zip(errors).for_each(|(square, error)| *square += error * error);
+    }
+    squares.into_iter().fold(0.0, f64::max).sqrt()
+}
+
 /// Channels of a CSV file: those of the columns asked for (time, reference, measured); or every axis of a flight log, of which
 /// the diagnosis needs `time_s`, `desired_{x,y,z}_m` and `measured_{x,y,z}_m`; or `time_s`, `reference` (or `desired`) and
 /// `measured`.

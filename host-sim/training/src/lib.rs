@@ -23,6 +23,7 @@
 //! | 1 | `channel`, `breakdown`, `hold_out` | channels of logs; flights that teach nothing; logs that are held out |
 //! | 1 | `purpose`, `observer` | seeds; who watches |
 //! | 2 | `examples`, `gates` | rows of features from logs; the diagnosis before a training |
+//! | 2 | `track` | axes of the logs of any loop, for a replay |
 //! | 2 | `recipe` | everything that decides, as data |
 //! | 3 | `learn` | logs to networks |
 //! | 4 | `error`, `files`, `models` | why there are no models; files written whole; descriptions |
@@ -52,6 +53,7 @@ pub mod pipeline;
 pub mod purpose;
 pub mod recipe;
 pub mod supervised;
+pub mod track;
 pub mod validation;
 
 pub use breakdown::{Breakdown, largest_sound_error};
