@@ -14,7 +14,7 @@
 //! | the first 80 | no: nobody knows what the loop was asked before |
 //! | the last 80 | no: nobody knows where the trajectory would have gone on |
 
-use impromptu_firmware::learning::{AHEAD, Filter, Learner, Limits, Parts, Response};
+use impromptu_firmware::learning::{AHEAD, Filter, Learner, Limits, Measured, Parts, Response};
 use impromptu_training::track::Track;
 use serde::Serialize;
 
@@ -24,6 +24,10 @@ use crate::second_order::{Known, SecondOrder, resampled};
 const UNKNOWN: usize = AHEAD as usize;
 /// Share of the bound that the feedback part has.
 const FEEDBACK: f64 = 0.6;
+/// What corrections are at their largest in a calm flight, as a share of the bound, and their change in a second.
+const SCALE: f32 = 0.5;
+/// See [`SCALE`].
+const RATE: f32 = 20.0;
 /// Flights that the response is identified from.
 const IDENTIFIED: usize = 2;
 /// What the real loop's frequency may be of the guessed one's, and its delay of the guessed one by the inverse.
@@ -188,15 +192,15 @@ struct Loop {
     rate_hz: f64,
     /// What the loop makes of a correction.
     answer: Response,
-    /// A learner for each axis, and its bounds.
-    learners: Vec<(Learner, Limits)>,
+    /// A learner for each axis.
+    learners: Vec<Learner>,
 }
 
 impl Loop {
     /// A flight: counted ticks, sums of the squares of the error as recorded and as predicted.
     fn fly(&mut self, axes: &[Signals], learn: Parts) -> (usize, f64, f64) {
         let (mut counted, mut recorded, mut predicted) = (0, 0.0, 0.0);
-        for (signals, (learner, limits)) in axes.iter().zip(&mut self.learners) {
+        for (signals, learner) in axes.iter().zip(&mut self.learners) {
             let ticks = signals.reference.len().saturating_sub(UNKNOWN);
             let delay = 1 + self.answer.delay();
             let (mut filter, mut corrections) = (Filter::default(), Vec::with_capacity(ticks));
@@ -209,8 +213,8 @@ impl Loop {
                 let answer_rate = f64::from(filter.change()) * self.rate_hz;
                 let desired = |offset: i32| signals.desired(tick as i64 + i64::from(offset));
                 let learn = if tick < UNKNOWN { Parts::NONE } else { learn };
-                let (value, rate) = ((measured + answer) as f32, (rate + answer_rate) as f32);
-                corrections.push(learner.step(desired, value, rate, learn, Parts::BOTH, limits));
+                let measured_then = Measured { value: (measured + answer) as f32, rate: (rate + answer_rate) as f32 };
+                corrections.push(learner.step(desired, Some(measured_then), learn, Parts::BOTH));
                 if tick >= UNKNOWN {
                     counted += 1;
                     recorded += (measured - reference).powi(2);
@@ -284,9 +288,9 @@ impl Replay {
         // Bounded by what the trajectories reach over: a correction is no journey of its own.
         let extents = flights.iter().flat_map(|flight| &flight.tracks).map(|track| extent(&track.reference));
         let bound = extents.fold(0.0, f64::max);
-        let limits = Limits { correction: bound as f32, feedback: (FEEDBACK * bound) as f32 };
-        let learner = Learner::new(answer, rate_hz as f32, 0.0);
-        let learners = vec![(learner, limits); first.tracks.len()];
+        let still = || ReplayError::Still { flight: first.name.clone() };
+        let learner = Learner::new(answer, rate_hz as f32, 0.0, limits(bound)).ok_or_else(still)?;
+        let learners = vec![learner; first.tracks.len()];
         let closed_loop = Loop { rate_hz, answer, learners };
         let signals: Vec<(&str, Vec<Signals>)> = flights
             .iter()
@@ -303,6 +307,12 @@ impl Replay {
         let learned_min = flights.iter().map(|flight| flight.seconds).sum::<f64>() / 60.0;
         Ok(Self { response, identified_from, misfit, rate_hz, log_hz, measured_rate, flights, otherwise, learned_min })
     }
+}
+
+/// Bounds of corrections of trajectories that reach over so much.
+fn limits(extent: f64) -> Limits {
+    let correction = extent as f32;
+    Limits { scale: SCALE * correction, correction, feedback: FEEDBACK as f32 * correction, rate: RATE * correction }
 }
 
 fn check_axes(flights: &[Flight], first: &Flight) -> Result<(), ReplayError> {

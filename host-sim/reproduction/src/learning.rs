@@ -16,7 +16,7 @@ use impromptu_firmware::{adapter::Lanes, model::Model};
 use impromptu_report::{Figure, study::Study};
 use impromptu_sim::{
     flights::Loop,
-    learned::{Learned, after, one_after_another, second_by_second},
+    learned::{LearningLoop, after, one_after_another, second_by_second},
     trajectory::strokes,
 };
 use impromptu_training::{Purpose, Recipe, build, derived, observer::Observer};
@@ -106,8 +106,12 @@ fn fly(settings: &Settings, case: &Case, models: &BTreeMap<String, Vec<u8>>) -> 
     let rate = closed_loop.rate_hz();
     let test = strokes(seed, settings.strokes, case.speed, rate)?;
     let teach = strokes(derived(settings.seed, Purpose::Training), 12, case.speed, rate)?;
-    let learned =
-        Learned { closed_loop: &closed_loop, model: model.as_ref().map(|model| (model, Lanes::BOTH)), parts: case.parts, seed };
+    let learned = LearningLoop {
+        closed_loop: &closed_loop,
+        model: model.as_ref().map(|model| (model, Lanes::BOTH)),
+        parts: case.parts,
+        seed,
+    };
     let flown = match case.seconds {
         Seconds::FromFirstStroke => one_after_another(&learned, &test, case.then_later_s),
         Seconds::After(seconds) => after(&learned, seconds, &teach, &test),

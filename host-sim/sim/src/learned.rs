@@ -22,7 +22,7 @@ const OTHER_SEEDS: u64 = 1 << 32;
 
 /// What learns.
 #[derive(Clone, Copy, Debug)]
-pub struct Learned<'a> {
+pub struct LearningLoop<'a> {
     /// The loop that is flown.
     pub closed_loop: &'a Loop,
     /// The model before it and its lanes, if there is one.
@@ -48,7 +48,7 @@ pub struct Flown {
     pub forgotten: u32,
 }
 
-impl<'a> Learned<'a> {
+impl<'a> LearningLoop<'a> {
     fn nothing(&self) -> Result<FlightLearning, RolloutError> {
         let mut learning = self.closed_loop.learning()?;
         learning.switch(self.parts, self.parts);
@@ -76,7 +76,7 @@ fn seconds(trajectory: &Trajectory) -> f64 {
 ///
 /// # Errors
 /// If a stroke cannot be flown.
-pub fn one_after_another(learned: &Learned<'_>, strokes: &[Trajectory], later_s: f64) -> Result<Flown, RolloutError> {
+pub fn one_after_another(learned: &LearningLoop<'_>, strokes: &[Trajectory], later_s: f64) -> Result<Flown, RolloutError> {
     let mut learning = learned.nothing()?;
     let closed_loop = learned.closed_loop;
     let mut baseline = closed_loop.errors(strokes, None, 1.0, learned.seed)?;
@@ -107,7 +107,7 @@ pub fn one_after_another(learned: &Learned<'_>, strokes: &[Trajectory], later_s:
 ///
 /// # Errors
 /// If a stroke cannot be flown.
-pub fn taught(learned: &Learned<'_>, motion_s: u32, strokes: &[Trajectory]) -> Result<(FlightLearning, f64), RolloutError> {
+pub fn taught(learned: &LearningLoop<'_>, motion_s: u32, strokes: &[Trajectory]) -> Result<(FlightLearning, f64), RolloutError> {
     let mut learning = learned.nothing()?;
     let mut left = f64::from(motion_s);
     let mut flown = 0.0;
@@ -132,7 +132,12 @@ pub fn taught(learned: &Learned<'_>, motion_s: u32, strokes: &[Trajectory]) -> R
 ///
 /// # Errors
 /// If a stroke cannot be flown.
-pub fn after(learned: &Learned<'_>, motion_s: u32, teach: &[Trajectory], strokes: &[Trajectory]) -> Result<Flown, RolloutError> {
+pub fn after(
+    learned: &LearningLoop<'_>,
+    motion_s: u32,
+    teach: &[Trajectory],
+    strokes: &[Trajectory],
+) -> Result<Flown, RolloutError> {
     let (learning, flown) = taught(learned, motion_s, teach)?;
     let (errors, forgotten) = each(learned, learned.closed_loop, &learning, strokes)?;
     let baseline = learned.closed_loop.errors(strokes, None, 1.0, learned.seed)?;
@@ -142,7 +147,7 @@ pub fn after(learned: &Learned<'_>, motion_s: u32, teach: &[Trajectory], strokes
 
 /// Each stroke by itself with what was learned.
 fn each(
-    learned: &Learned<'_>,
+    learned: &LearningLoop<'_>,
     closed_loop: &Loop,
     learning: &FlightLearning,
     strokes: &[Trajectory],

@@ -55,8 +55,7 @@ fn the_prediction_is_what_a_linear_loop_then_flies() {
     let replay = Replay::of(&flights, &known(LOOP)).unwrap();
     assert_eq!((replay.rate_hz, replay.misfit), (HZ, None));
     let bound = flights.iter().map(|flight| extent(&flight.tracks[0].reference)).fold(0.0, f64::max);
-    let limits = Limits { correction: bound as f32, feedback: (FEEDBACK * bound) as f32 };
-    let mut learner = Learner::new(LOOP.response(HZ).unwrap(), HZ as f32, 0.0);
+    let mut learner = Learner::new(LOOP.response(HZ).unwrap(), HZ as f32, 0.0, limits(bound)).unwrap();
     for (seed, (flight, predicted)) in (1..).zip(flights.iter().zip(&replay.flights)) {
         let desired = &flight.tracks[0].reference;
         let ticks = desired.len() - UNKNOWN;
@@ -70,7 +69,7 @@ fn the_prediction_is_what_a_linear_loop_then_flies() {
                     tick => at(tick),
                 };
                 let learn = if tick < UNKNOWN { Parts::NONE } else { learn };
-                f64::from(learner.step(around, value as f32, rate as f32, learn, Parts::BOTH, &limits))
+                f64::from(learner.step(around, Some(Measured { value: value as f32, rate: rate as f32 }), learn, Parts::BOTH))
             });
             let errors = measured.iter().zip(desired).skip(UNKNOWN).map(|(measured, desired)| (measured - desired).powi(2));
             (mean(errors).sqrt(), learner)

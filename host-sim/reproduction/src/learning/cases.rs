@@ -119,9 +119,15 @@ impl Case {
         plain && self.asked.is_some() && self.air == "lab" && self.gains == "stock"
     }
 
+    /// Vehicle, loop and what the flights meet.
+    pub(super) fn loop_name(&self) -> String {
+        let gains = if self.controller == Controller::Se3 { self.gains } else { self.kind() };
+        format!("{} {gains}, {}", self.vehicle, self.condition())
+    }
+
     /// All of it in words.
     pub fn name(&self) -> String {
-        format!("{} {} {} {}, {}", self.vehicle, self.kind(), self.gains, self.condition(), self.seconds.words())
+        format!("{}, {}", self.loop_name(), self.seconds.words())
     }
 
     /// The loop that is flown.

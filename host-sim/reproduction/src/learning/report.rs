@@ -22,8 +22,10 @@ pub(super) fn tell(study: &mut Study, settings: &Settings, cases: &[Case], rows:
         ),
     );
     for (index, (case, row)) in cases.iter().zip(rows).enumerate() {
-        let title =
-            format!("{} {}, {}, x{}, {}, {}", row.vehicle, row.gains, row.condition, row.speed, row.seconds.words(), row.parts);
+        // The same words would be one row of a table.
+        let speed = if row.speed == 1.0 { String::new() } else { format!(" at {}x", row.speed) };
+        let parts = if row.parts == "both" { String::new() } else { format!(", {}", row.parts) };
+        let title = format!("{}{speed}, {}{parts}", case.loop_name(), row.seconds.words());
         let asked = case.asked;
         let table = match row.start {
             "nothing" => "From nothing",
