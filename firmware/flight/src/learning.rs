@@ -20,7 +20,12 @@ use crate::{
 
 /// Acceleration that the loop is asked for by a correction in a calm flight, m/s².
 const ACCELERATION: f32 = 6.5;
-/// What the feedback part has of it.
+/// How far from what the desired motion needs a correction may take what the loop is asked for, m/s²: across, and up and down,
+/// where thrust must be left to turn the vehicle with.
+const ACROSS: f32 = 6.0;
+/// See [`ACROSS`].
+const VERTICAL: f32 = 4.0;
+/// What the feedback part has of a calm flight's.
 const FEEDBACK: f32 = 0.3;
 /// Time in which a correction may go from nothing to its limit, s.
 const RISE: f32 = 0.05;
@@ -34,6 +39,10 @@ pub struct Guess {
     pub response: Response,
     /// Bounds of the correction, m and m/s.
     pub limits: Limits,
+    /// Acceleration that the loop asks for of a position error, 1/s².
+    pub stiffness: f32,
+    /// Acceleration that it asks for against a velocity that it was not told, 1/s; 0 for a loop that has velocity references.
+    pub drag: f32,
 }
 
 impl Guess {
@@ -45,10 +54,19 @@ impl Guess {
             let response = Response::second_order(1.0, frequency, 0.5 * kd / frequency, age_s + ATTITUDE, rate)?;
             let (scale, correction) = (ACCELERATION / kp, caps::ACCELERATION / kp);
             let limits = Limits { scale, correction, feedback: FEEDBACK * scale, rate: correction / RISE };
-            Some(Self { response, limits })
+            Some(Self { response, limits, stiffness: kp, drag: 0.0 })
         };
         let ([px, py, pz], [dx, dy, dz]) = (settings.position.kp, settings.position.kd);
         Some([of(px, dx)?, of(py, dy)?, of(pz, dz)?])
+    }
+
+    /// Where a correction may be while this motion is desired, m: between nothing and what takes the loop's lag away, and a little
+    /// further.
+    fn room(&self, acceleration: f32, velocity: f32, margin: f32) -> [f32; 2] {
+        let needs = [0.0, acceleration, acceleration + self.drag * velocity];
+        let low = needs.iter().fold(0.0f32, |low, need| low.min(*need));
+        let high = needs.iter().fold(0.0f32, |high, need| high.max(*need));
+        [(low - margin) / self.stiffness, (high + margin) / self.stiffness]
     }
 }
 
@@ -56,6 +74,7 @@ impl Guess {
 #[derive(Clone, Debug)]
 pub struct FlightLearning {
     axes: [Learner; 3],
+    guesses: [Guess; 3],
     /// Parts that learn, and parts that act.
     learn: Parts,
     act: Parts,
@@ -71,7 +90,7 @@ impl FlightLearning {
         let learner = |guess: &Guess| Learner::new(guess.response, rate_hz, age_s, guess.limits);
         let [x, y, z] = guesses;
         let axes = [learner(x)?, learner(y)?, learner(z)?];
-        Some(Self { axes, learn: Parts::BOTH, act: Parts::BOTH, last: None, offset: Vector3::zeros() })
+        Some(Self { axes, guesses: *guesses, learn: Parts::BOTH, act: Parts::BOTH, last: None, offset: Vector3::zeros() })
     }
 
     /// Which parts learn, and which act.
@@ -117,7 +136,12 @@ impl FlightLearning {
         self.last = Some(now);
         let known = state.is_physical();
         // One row of the window at a time: ten channels of a setpoint hold three positions.
-        for (axis, learner) in self.axes.iter_mut().enumerate() {
+        let present = flight.setpoint(now);
+        for (axis, (learner, guess)) in self.axes.iter_mut().zip(&self.guesses).enumerate() {
+            let [velocity, acceleration] =
+                [present.velocity, present.acceleration].map(|vector| vector.get(axis).copied().unwrap_or(0.0));
+            let [low, high] = guess.room(acceleration, velocity, if axis == 2 { VERTICAL } else { ACROSS });
+            learner.bound(low, high);
             let desired = |offset: i32| {
                 let tick = now.wrapping_add(offset.clamp(-BEHIND - 1, AHEAD));
                 flight.setpoint(tick).position.get(axis).copied().unwrap_or(0.0)

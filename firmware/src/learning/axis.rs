@@ -43,7 +43,7 @@ const ANSWERED: usize = FREE + LATER as usize;
 /// Standard deviations of the weights before anything was learned.
 const PRIOR: f32 = 1.0;
 /// Of the constant, and noise of a row of each part, in scales of the axis.
-const CONSTANT_PRIOR: f32 = 0.05;
+const CONSTANT_PRIOR: f32 = 0.3;
 const PREVIEW_SIGMA: f32 = 0.015;
 const FEEDBACK_SIGMA: f32 = 0.007;
 /// Control weight, and weight of the margin rows.
@@ -56,6 +56,12 @@ const NOISE_WINDOW: f32 = 2.0;
 const FLOOR: f32 = 0.02;
 /// What is excited is forgotten with this time constant, s.
 const MEMORY: f32 = 30.0;
+
+/// A part acts with a share that grows with the time in motion that it has learned from, s: least squares that have seen a second
+/// of a motion are surer of themselves than they may be. In motion is where a feature is larger than this, in scales of the axis.
+const PREVIEW_TIME: f32 = 4.0;
+const FEEDBACK_TIME: f32 = 6.0;
+const MOTION: f32 = 0.01;
 
 /// Ticks from one row of a kind to the next, and without rows after the start, when the filters know too little yet.
 const EACH: u32 = 4;
@@ -155,6 +161,10 @@ pub struct Learner {
     answers: [Filter; 2],
     answered: [Ring<ANSWERED>; 2],
     judge: Judge,
+    /// What is possible now.
+    room: [f32; 2],
+    /// Time in motion that was learned from, s.
+    learned_s: f32,
     /// Mean square of what the preview part's rows surprise by.
     noise: f32,
     correction: f32,
@@ -193,6 +203,8 @@ impl Learner {
             answers: [Filter::default(); 2],
             answered: [Ring::filled(0.0), Ring::filled(0.0)],
             judge: Judge::default(),
+            room: [-limits.correction, limits.correction],
+            learned_s: 0.0,
             noise: 0.0,
             correction: 0.0,
             ticks: 0,
@@ -211,11 +223,17 @@ impl Learner {
         self.judge.start();
     }
 
+    /// What a correction may be from now on, within the limits: from where to where. The limits if it is not said.
+    pub fn bound(&mut self, low: f32, high: f32) {
+        self.room = [low, high];
+    }
+
     /// Forgets what was learned.
     pub fn forget(&mut self) {
         self.preview.reset();
         self.feedback.reset();
         self.noise = 0.0;
+        self.learned_s = 0.0;
     }
 
     /// What was learned.
@@ -261,11 +279,13 @@ impl Learner {
         }
         let share = self.judge.share();
         let Limits { correction: most, feedback: fed_most, rate, .. } = self.limits;
-        let preview = if act.preview { self.preview.dot(&self.window(&desired, 1.0)) } else { 0.0 };
-        let feedback = if act.feedback { self.feedback.dot(&self.past(&self.free, 0)) } else { 0.0 };
+        let learned = |time: f32| clamp(self.learned_s / time, 0.0, 1.0);
+        let preview = if act.preview { learned(PREVIEW_TIME) * self.preview.dot(&self.window(&desired, 1.0)) } else { 0.0 };
+        let feedback = if act.feedback { learned(FEEDBACK_TIME) * self.feedback.dot(&self.past(&self.free, 0)) } else { 0.0 };
         let feedback = clamp(share * feedback, -fed_most, fed_most);
         let step = rate / self.rate_hz;
-        let asked = clamp(share * preview + feedback, -most, most);
+        let [low, high] = self.room;
+        let asked = clamp(share * preview + feedback, clamp(low, -most, most), clamp(high, -most, most));
         self.correction = clamp(asked, self.correction - step, self.correction + step);
         self.all.inputs.push(self.correction);
         self.fed.inputs.push(feedback);
@@ -295,6 +315,10 @@ impl Learner {
                 self.noise += (clamp(surprise * surprise, 0.0, most) - self.noise) * EACH as f32 / (NOISE_WINDOW * self.rate_hz);
                 let noise = PREVIEW_SIGMA * self.limits.scale + sqrt(self.noise.max(0.0));
                 self.preview.learn(&row, missing, noise, forgotten);
+                let (_, features) = row.split_last().unwrap_or((&0.0, &[]));
+                if features.iter().any(|feature| feature.abs() > MOTION * self.limits.scale) {
+                    self.learned_s += EACH as f32 / self.rate_hz;
+                }
             }
             1 if learn.feedback && since(FEEDBACK_AFTER) => {
                 self.feedback.learn(&self.past(&self.answered, 0), -self.free[0].past(0), sigma, forgotten);

@@ -103,7 +103,13 @@ impl Loop {
     /// If the gains are not those of a loop of second order.
     pub fn learning(&self) -> Result<FlightLearning, RolloutError> {
         let (age, rate) = (self.condition.measurement_delay_s as f32, self.rate_hz() as f32);
-        let guesses = Guess::of(&self.settings, age);
+        let kd = self.settings.position.kd;
+        // The Crazyflie's PID is given positions alone.
+        let drag = |axis: usize| if self.controller == Controller::Pid { kd[axis] } else { 0.0 };
+        let guesses = Guess::of(&self.settings, age).map(|guesses| {
+            let [x, y, z] = guesses;
+            [Guess { drag: drag(0), ..x }, Guess { drag: drag(1), ..y }, Guess { drag: drag(2), ..z }]
+        });
         guesses.and_then(|guesses| FlightLearning::new(&guesses, rate, age)).ok_or_else(|| {
             RolloutError::Airframe(format!("gains `{}`: no loop of second order, whose response could be guessed", self.gains))
         })

@@ -124,7 +124,7 @@ impl Command {
             Self::Fly(command) => command.conflict(),
             Self::Evaluate(command) => command.conflict(),
             Self::Study(command) => command.conflict(),
-            Self::Diagnose(_) | Self::Report(_) | Self::Trajectory(_) => None,
+            Self::Diagnose(_) | Self::Learn(_) | Self::Report(_) | Self::Trajectory(_) => None,
         }
     }
 }
