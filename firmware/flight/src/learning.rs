@@ -160,3 +160,86 @@ impl FlightLearning {
         self.offset
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{settings::tests::GOOD, types::Setpoint};
+    use impromptu_firmware::network::Scratch;
+    use proptest::prelude::*;
+
+    fn learning() -> FlightLearning {
+        FlightLearning::new(&Guess::of(&GOOD, 0.024).unwrap(), 100.0, 0.024).unwrap()
+    }
+
+    /// A motion along x, from rest at tick 100 of the position loop.
+    fn desired(tick: i32) -> Setpoint {
+        let t = 0.01 * (tick - 100).max(0) as f32;
+        let x = 0.5 - 0.5 * (2.0 * t).cos();
+        let (v, a) = ((2.0 * t).sin(), 2.0 * (2.0 * t).cos());
+        let moving = if tick > 100 { 1.0 } else { 0.0 };
+        Setpoint {
+            position: Vector3::new(x, 0.0, 1.0),
+            velocity: Vector3::new(v, 0.0, 0.0),
+            acceleration: Vector3::new(moving * a, 0.0, 0.0),
+            yaw: 0.0,
+        }
+    }
+
+    /// Flies in a world in which the vehicle is where it is desired to be, but late and pushed: offsets of each reference tick.
+    fn offsets(start: u32, ticks: i32, airborne: impl Fn(i32) -> bool, state: impl Fn(i32) -> State) -> Vec<[u32; 3]> {
+        let (mut flight, mut learning, mut scratch) = (Flight::new(&GOOD).unwrap(), learning(), Scratch::new());
+        let mut all = Vec::new();
+        for tick in 0..ticks {
+            while flight.next_setpoint() <= tick + AHEAD + 1 {
+                assert!(flight.push_setpoint(&desired(flight.next_setpoint())));
+            }
+            flight.set_airborne(airborne(tick));
+            for phase in 0..5 {
+                let now = Tick(start.wrapping_add(5 * tick as u32 + phase));
+                let state = state(tick);
+                let offset = learning.step(&mut flight, now, &state);
+                flight.step(now, &state, &mut scratch);
+                if phase == 0 {
+                    all.push(offset.map(f32::to_bits).into());
+                }
+            }
+        }
+        all
+    }
+
+    fn behind(tick: i32) -> State {
+        State { position: desired(tick - 20).position, velocity: desired(tick - 20).velocity, ..State::ORIGIN }
+    }
+
+    #[test]
+    fn it_corrects_in_the_air_and_not_on_the_ground() {
+        let in_the_air = offsets(0, 900, |_| true, behind);
+        let largest = in_the_air.iter().map(|[x, ..]| f32::from_bits(*x).abs()).fold(0.0, f32::max);
+        assert!(largest > 0.05, "{largest}");
+        let landed = offsets(0, 900, |tick| tick < 600, behind);
+        assert_eq!(landed[..600], in_the_air[..600]);
+        assert!(landed[600..].iter().flatten().all(|bits| f32::from_bits(*bits) == 0.0));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+
+        #[test]
+        fn an_offset_is_a_number_within_its_limits_whatever_is_measured(
+            odd in prop::collection::vec((any::<[f32; 6]>(), prop::array::uniform6(-3f32..3.0), any::<bool>()), 1..40)
+        ) {
+            let limits = Guess::of(&GOOD, 0.024).unwrap().map(|guess| guess.limits.correction);
+            let state = |tick: i32| {
+                let (bits, sane, insane) = odd[tick as usize % odd.len()];
+                let [px, py, pz, vx, vy, vz] = if insane && tick % 7 == 0 { bits } else { sane };
+                State { position: Vector3::new(px, py, pz), velocity: Vector3::new(vx, vy, vz), ..State::ORIGIN }
+            };
+            for offset in offsets(0, 500, |tick| tick % 200 != 150, state) {
+                for (bits, limit) in offset.into_iter().zip(limits) {
+                    prop_assert!(f32::from_bits(bits).abs() <= limit, "{offset:?}");
+                }
+            }
+        }
+    }
+}

@@ -59,8 +59,8 @@ const MEMORY: f32 = 30.0;
 
 /// A part acts with a share that grows with the time in motion that it has learned from, s: least squares that have seen a second
 /// of a motion are surer of themselves than they may be. In motion is where a feature is larger than this, in scales of the axis.
-const PREVIEW_TIME: f32 = 4.0;
-const FEEDBACK_TIME: f32 = 6.0;
+const PREVIEW_TIME: f32 = 2.8;
+const FEEDBACK_TIME: f32 = 5.0;
 const MOTION: f32 = 0.01;
 
 /// Ticks from one row of a kind to the next, and without rows after the start, when the filters know too little yet.

@@ -8,8 +8,10 @@
 mod cases;
 mod report;
 mod row;
+#[cfg(test)]
+mod tests;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, btree_map::Entry};
 
 use anyhow::Context as _;
 use impromptu_firmware::{adapter::Lanes, model::Model};
@@ -90,9 +92,9 @@ fn models(settings: &Settings, all: &[Case], observer: &dyn Observer) -> anyhow:
     let mut models = BTreeMap::new();
     for case in all.iter().filter_map(Case::made_for) {
         let (name, closed_loop) = case?;
-        if !models.contains_key(&name) {
-            observer.stage(&format!("{name}: building the model"));
-            models.insert(name, build(&settings.recipe, &closed_loop, settings.seed, &mut |_| {})?.models.int8);
+        if let Entry::Vacant(place) = models.entry(name) {
+            observer.stage(&format!("{}: building the model", place.key()));
+            place.insert(build(&settings.recipe, &closed_loop, settings.seed, &mut |_| {})?.models.int8);
         }
     }
     Ok(models)

@@ -136,3 +136,46 @@ fn what_is_wrong_with_a_log_and_what_to_do_is_said() {
     );
     assert!(!folder.path("out/learn.html").exists());
 }
+
+/// What is learned in flight is flown, from nothing and on the way, with the loops that a vehicle may have.
+#[test]
+fn fly_and_evaluate_learn_in_flight() {
+    let folder = Folder::new();
+    let flown =
+        folder.fine("fly --trajectory figure8 --learn 20 --controller pid --speed 0.7 --log pid.csv --format json").json();
+    let flights = flown["flights"].as_array().unwrap();
+    assert_eq!(flights[1]["method"], "learned");
+    assert!(flights.len() == 2 && flights[1]["reduction"].as_f64().unwrap() > 80.0, "{flown}");
+    // The log is that of the flight that learned.
+    assert!(String::from_utf8(folder.read("pid.csv")).unwrap().starts_with("time_s,desired_x_m"));
+    let evaluated = folder.fine("evaluate --learn 30 --strokes 4 --speed 1 --format json").json();
+    let rows = evaluated["table"].as_array().unwrap();
+    assert_eq!(rows.iter().map(|row| row["method"].as_str().unwrap()).collect::<Vec<_>>(), ["baseline", "learned"]);
+    assert!(rows[1]["reduction_mean"].as_f64().unwrap() > 70.0, "{evaluated}");
+    // The same seed gives the same bytes.
+    assert_eq!(evaluated, folder.fine("evaluate --learn 30 --strokes 4 --speed 1 --format json").json());
+    let refused = folder.run("fly --trajectory figure8 --learn 1e9");
+    assert!(refused.code == 2 && refused.stderr.contains("whole seconds from 0 to 3600"), "{}", refused.stderr);
+}
+
+#[test]
+fn the_study_of_learning_has_the_documented_rows() {
+    let folder = Folder::new();
+    let found = folder.fine("study learning --from-nothing --strokes 5 --format json").json();
+    let rows = found["rows"].as_array().unwrap();
+    assert!(rows.len() >= 25, "{}", rows.len());
+    for row in rows {
+        for key in ["vehicle", "loop", "condition", "start", "parts"] {
+            assert!(row[key].is_string(), "{key}: {row}");
+        }
+        for key in ["rms_cm_mean", "reduction_mean", "reduction_worst"] {
+            assert!(row[key].as_f64().unwrap().is_finite(), "{key}: {row}");
+        }
+        assert!(row["seconds"].is_u64() || row["seconds"] == "from_first_stroke", "{row}");
+        assert!(row["seed"].as_u64() == Some(1) && row["start"] == "nothing", "{row}");
+    }
+    let loops: std::collections::BTreeSet<&str> = rows.iter().filter_map(|row| row["loop"].as_str()).collect();
+    assert_eq!(loops.into_iter().collect::<Vec<_>>(), ["mellinger", "mellinger_feed_forward", "pid", "se3"]);
+    let page = String::from_utf8(folder.read("out/study-learning.html")).unwrap();
+    assert!(page.contains("The error melts") && page.contains("<svg"), "the first figure");
+}

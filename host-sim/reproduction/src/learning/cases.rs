@@ -178,6 +178,9 @@ pub fn cases() -> Vec<Case> {
         let asked = Some(if air == "lab" { [97.5, 94.5] } else { [95.0, 91.0] });
         all.push(Case { controller: Controller::Pid, air, speed: PID_SPEED, asked, ..PLAIN });
     }
+    // Each stroke is a first one.
+    let first = Case { controller: Controller::Pid, speed: PID_SPEED, seconds: Seconds::After(0), ..PLAIN };
+    all.push(Case { asked: Some([78.0, -10.0]), ..first });
     all.push(Case { controller: Controller::Pid, ..PLAIN });
     for (feed_forward, asked, later) in [(false, None, None), (true, Some([75.0, 67.0]), Some([42.0, 30.0]))] {
         let mellinger = Case { controller: Controller::Mellinger { feed_forward }, speed: MELLINGER_SPEED, ..PLAIN };
