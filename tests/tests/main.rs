@@ -13,6 +13,7 @@
 //! - [`mcu`]: what kernels cost on the microcontroller, beside other engines, with a golden table;
 //! - [`image`]: what is flashed is within its budget, leaves the models alone, and starts behind a boot loader;
 //! - [`kernels`]: layers, networks and flights give the same bits on every core and in WebAssembly;
+//! - [`learning`]: loops that learn in flight from nothing keep their bounds, and no flight is harmed, from the first one on;
 //! - [`link`]: any bytes on the link are refused or messages, never a panic;
 //! - [`processor`]: control is never late, whatever the network takes; the processor's share; late inferences;
 //! - [`pil`]: the flashed binary flies the plant, bit for bit, through good lines and bad ones;
@@ -35,6 +36,7 @@ mod healthy;
 mod hostile;
 mod image;
 mod kernels;
+mod learning;
 mod link;
 mod mcu;
 mod pil;

@@ -60,8 +60,8 @@ impl Guess {
         Some([of(px, dx)?, of(py, dy)?, of(pz, dz)?])
     }
 
-    /// Where a correction may be while this motion is desired, m: between nothing and what takes the loop's lag away, and a little
-    /// further.
+    /// Where a correction may be while this motion is desired, m: between nothing and what takes the loop's lag away, and a
+    /// little further.
     fn room(&self, acceleration: f32, velocity: f32, margin: f32) -> [f32; 2] {
         let needs = [0.0, acceleration, acceleration + self.drag * velocity];
         let low = needs.iter().fold(0.0f32, |low, need| low.min(*need));

@@ -10,13 +10,13 @@
 //! | | | effort: features . v = 0, a control weight |
 //! | | | margin: (G features - G features of some ticks before) . v = 0: what more delay in the loop would change |
 //!
-//! Offsets and lags are those of a loop with a natural frequency of 0.0255 rad a tick (2.55 rad/s at 100 Hz); of a faster one they
-//! are shorter in proportion. What is learned is one row a tick: preview, feedback, margin, effort.
+//! Offsets and lags are those of a loop with a natural frequency of 0.0255 rad a tick (2.55 rad/s at 100 Hz); of a faster one
+//! they are shorter in proportion. What is learned is one row a tick: preview, feedback, margin, effort.
 
 use super::{
     judge::Judge,
     least_squares::{LeastSquares, above},
-    response::{Filter, MAX_DELAY, Response},
+    response::{Answer, Filter, Response},
     ring::Ring,
 };
 use crate::math::{clamp, sqrt};
@@ -49,8 +49,8 @@ const FEEDBACK_SIGMA: f32 = 0.007;
 /// Control weight, and weight of the margin rows.
 const EFFORT: f32 = 0.001;
 const MARGIN: f32 = 10.0;
-/// A motion that is faster than what was learned from leaves more that no weights explain. Its root mean square over this time, s,
-/// is noise too.
+/// A motion that is faster than what was learned from leaves more that no weights explain. Its root mean square over this time,
+/// s, is noise too.
 const NOISE_WINDOW: f32 = 2.0;
 /// Error that does not matter, in scales of the axis.
 const FLOOR: f32 = 0.02;
@@ -67,24 +67,6 @@ const MOTION: f32 = 0.01;
 const EACH: u32 = 4;
 const PREVIEW_AFTER: f32 = 60.0;
 const FEEDBACK_AFTER: f32 = 150.0;
-
-/// What the loop makes of a correction.
-#[derive(Clone, Debug)]
-struct Answer {
-    inputs: Ring<{ MAX_DELAY + 1 }>,
-    filter: Filter,
-}
-
-impl Answer {
-    fn new() -> Self {
-        Self { inputs: Ring::filled(0.0), filter: Filter::default() }
-    }
-
-    /// At a tick, before its correction is known.
-    fn at(&mut self, response: &Response) -> f32 {
-        self.filter.step(response, self.inputs.past(response.delay()))
-    }
-}
 
 /// Which parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -173,8 +155,8 @@ pub struct Learner {
 }
 
 impl Learner {
-    /// Nothing learned yet, of a loop with this response at this rate, Hz, whose measurements are `delay_s` old. `None` if a limit
-    /// is not a positive number.
+    /// Nothing learned yet, of a loop with this response at this rate, Hz, whose measurements are `delay_s` old. `None` if a
+    /// limit is not a positive number.
     pub fn new(response: Response, rate_hz: f32, delay_s: f32, limits: Limits) -> Option<Self> {
         let Limits { scale, correction, feedback, rate } = limits;
         if ![scale, correction, feedback, rate].iter().all(|limit| *limit > 0.0 && *limit < 1e12) {

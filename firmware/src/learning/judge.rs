@@ -3,10 +3,9 @@
 //! *in* the error with the correction, and what the response of the loop says that it would be without; *out* a share of 0..1;
 //! *never* a share that jumps up; *source* ours.
 //!
-//! Least squares that have seen a second of a motion are surer of themselves than they may be: what they ask for at first can be
-//! more than what is missing. And a loop can become another one. Either way the error grows beyond what it would be without the
-//! correction, which the response tells well enough also where it is wrong by a factor of two: of a good correction a tenth of the
-//! error is left.
+//! What was learned of one motion can be wrong for another one, and a loop can become another one. Either way the error grows
+//! beyond what it would be without the correction, which the response tells well enough also where it is wrong by a factor of
+//! two: of a good correction a tenth of the error is left.
 
 use crate::math::{clamp, sqrt};
 

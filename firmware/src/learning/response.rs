@@ -3,6 +3,7 @@
 //! *in* gain, natural frequency, damping and delay, guessed or measured; *out* a recursive filter; *never* an unstable one;
 //! *source* zero-order-hold discretisation of a second-order system (Åström and Wittenmark 1997, Table 2.1).
 
+use super::ring::Ring;
 use crate::math::finite_or_zero;
 
 /// Most ticks of delay.
@@ -88,6 +89,24 @@ impl Filter {
     /// Change from one tick to the next.
     pub fn change(&self) -> f32 {
         self.outputs[0] - self.outputs[1]
+    }
+}
+
+/// What the loop makes of a correction.
+#[derive(Clone, Debug)]
+pub(super) struct Answer {
+    pub(super) inputs: Ring<{ MAX_DELAY + 1 }>,
+    pub(super) filter: Filter,
+}
+
+impl Answer {
+    pub(super) fn new() -> Self {
+        Self { inputs: Ring::filled(0.0), filter: Filter::default() }
+    }
+
+    /// At a tick, before its correction is known.
+    pub(super) fn at(&mut self, response: &Response) -> f32 {
+        self.filter.step(response, self.inputs.past(response.delay()))
     }
 }
 

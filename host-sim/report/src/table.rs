@@ -14,7 +14,9 @@ use std::fmt::Write as _;
 pub fn console_table(results: &Results) -> String {
     let results = &results.harmless();
     let cases = Case::group(&results.table);
-    let methods = methods(&results.table);
+    // What quantisation costs is in the document and on the page: the columns would not fit.
+    let shown = |method: &Method| !matches!(method, Method::NetF32 | Method::FullF32);
+    let methods: Vec<Method> = methods(&results.table).into_iter().filter(shown).collect();
     let mut text = format!("{}\n", results.title);
     if cases.is_empty() {
         text.push_str("No flights: the table is empty.\n");
@@ -72,6 +74,11 @@ Each cell, {flights}: mean RMS position error in cm; below it its reduction in %
   net int8 + lane is what is flashed. 1.7x: times the drawn speed. +20ms: 20 ms more delay in the whole loop, at test time only.
 "
     );
+    if results.table.iter().any(|row| row.method == Method::Learned) {
+        text.push_str(
+            "  learned in flight: nothing trained, taught by a minute of other strokes, still learning in each flight.\n",
+        );
+    }
     let _ = writeln!(text, "Seed {}, version {}. Again: {}", results.seed, results.software_version, results.command);
     text
 }

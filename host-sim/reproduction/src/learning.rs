@@ -8,6 +8,7 @@
 mod cases;
 mod report;
 mod row;
+mod seconds;
 #[cfg(test)]
 mod tests;
 
@@ -25,7 +26,8 @@ use impromptu_training::{Purpose, Recipe, build, derived, observer::Observer};
 use rayon::prelude::*;
 
 pub use cases::{Case, Start, cases};
-pub use row::{Row, Seconds};
+pub use row::Row;
+pub use seconds::Seconds;
 
 /// What the study covers.
 #[derive(Clone, Debug)]

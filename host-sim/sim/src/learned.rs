@@ -1,7 +1,7 @@
 //! Flights that learn, and what is left of the error.
 //!
-//! *in* a loop, a model or none, trajectories; *out* their errors beside the baseline's of the same seeds; *never* a baseline that
-//! flew another vehicle or another air; *source* ours ([`impromptu_flight::learning`]).
+//! *in* a loop, a model or none, trajectories; *out* their errors beside the baseline's of the same seeds; *never* a baseline
+//! that flew another vehicle or another air; *source* ours ([`impromptu_flight::learning`]).
 
 use impromptu_firmware::{adapter::Lanes, learning::Parts, model::Model};
 use impromptu_flight::learning::FlightLearning;
@@ -165,8 +165,8 @@ fn each(
     Ok((flown.iter().map(|(error, _)| *error).collect(), flown.iter().map(|(_, forgotten)| forgotten).sum()))
 }
 
-/// Root mean square error over flights, second by second in motion: points (s, m) without learning and with it, from nothing. Each
-/// flight flies strokes of its own one after another; rests between them are left out.
+/// Root mean square error over flights, second by second in motion: points (s, m) without learning and with it, from nothing.
+/// Each flight flies strokes of its own one after another; rests between them are left out.
 ///
 /// # Errors
 /// If a stroke cannot be flown.

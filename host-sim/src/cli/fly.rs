@@ -66,7 +66,8 @@ pub(super) struct Fly {
     #[arg(long, value_enum, default_value_t, requires = "model")]
     lanes: LaneChoice,
     /// Learns in flight, from nothing or on top of the model: from SECONDS of motion of other strokes, and on the way.
-    #[arg(long, value_name = "SECONDS", num_args = 0..=1, default_missing_value = "0", conflicts_with = "pil", value_parser = learning)]
+    #[arg(long, value_name = "SECONDS", num_args = 0..=1, default_missing_value = "0", conflicts_with = "pil")]
+    #[arg(value_parser = learning)]
     learn: Option<u32>,
     /// Flies through the firmware on the emulated microcontroller, which it builds.
     #[arg(long)]

@@ -6,7 +6,7 @@
 use impromptu_firmware::learning::Parts;
 use impromptu_sim::{condition::Condition, controller::Controller, flights::Loop, plant::Vehicle, rollout::RolloutError};
 
-use super::row::Seconds;
+use super::seconds::Seconds;
 use crate::robustness::Mismatch;
 
 /// What is known before anything is learned.
@@ -65,8 +65,8 @@ pub struct Case {
     pub asked: Option<[f64; 2]>,
 }
 
-/// Factors on the speed of the strokes at which the Crazyflie's loops have the errors that their C code has on other strokes: 27.3 cm,
-/// 5.77 cm, 1.35 cm.
+/// Factors on the speed of the strokes at which the Crazyflie's loops have the errors that their C code has on other strokes:
+/// 27.3 cm, 5.77 cm, 1.35 cm.
 const PID_SPEED: f64 = 0.7;
 /// See [`PID_SPEED`].
 const MELLINGER_SPEED: f64 = 0.92;

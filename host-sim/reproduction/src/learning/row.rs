@@ -6,35 +6,7 @@
 use impromptu_sim::{flights::reduction, learned::Flown};
 use serde::Serialize;
 
-use super::cases::Case;
-
-/// How long was learned before the flights that are judged.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Seconds {
-    /// Seconds of motion; each judged flight begins with what these taught.
-    After(u32),
-    /// Strokes one after another; the first four are not judged.
-    FromFirstStroke,
-}
-
-impl Seconds {
-    /// In words.
-    pub fn words(self) -> String {
-        match self {
-            Self::After(seconds) => format!("after {seconds} s"),
-            Self::FromFirstStroke => "from the first stroke on".into(),
-        }
-    }
-}
-
-impl Serialize for Seconds {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::After(seconds) => serializer.serialize_u32(*seconds),
-            Self::FromFirstStroke => serializer.serialize_str("from_first_stroke"),
-        }
-    }
-}
+use super::{cases::Case, seconds::Seconds};
 
 /// A row: errors of the test strokes without and with what was learned.
 #[derive(Clone, Debug, PartialEq, Serialize)]
