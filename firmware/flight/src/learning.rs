@@ -30,7 +30,7 @@ const FEEDBACK: f32 = 0.3;
 /// Time in which a correction may go from nothing to its limit, s.
 const RISE: f32 = 0.05;
 /// From the position loop's command to the vehicle's acceleration, s: an attitude loop of 20 rad/s.
-const ATTITUDE: f32 = 0.055;
+pub const ATTITUDE: f32 = 0.055;
 
 /// What is known of an axis: how its loop answers, and what a correction may be.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -19,12 +19,13 @@ use impromptu_firmware::{adapter::Lanes, model::Model};
 use impromptu_report::{Figure, study::Study};
 use impromptu_sim::{
     flights::Loop,
-    learned::{LearningLoop, after, one_after_another, second_by_second},
-    trajectory::strokes,
+    learned::{Flown, LearningLoop, after, one_after_another, second_by_second},
+    trajectory::{Trajectory, strokes},
 };
 use impromptu_training::{Purpose, Recipe, build, derived, observer::Observer};
 use rayon::prelude::*;
 
+use crate::robustness::draw::Ranges;
 pub use cases::{Case, Start, cases};
 pub use row::Row;
 pub use seconds::Seconds;
@@ -67,6 +68,8 @@ pub fn run(settings: &Settings, command: &str, observer: &dyn Observer) -> anyho
     Ok(Found { rows, study })
 }
 
+/// Strokes that each drawn vehicle flies.
+const DRAW_STROKES: usize = 8;
 /// Flights that a picture of the first minute averages.
 const FLIGHTS: u64 = 10;
 
@@ -110,15 +113,24 @@ fn fly(settings: &Settings, case: &Case, models: &BTreeMap<String, Vec<u8>>) -> 
     let rate = closed_loop.rate_hz();
     let test = strokes(seed, settings.strokes, case.speed, rate)?;
     let teach = strokes(derived(settings.seed, Purpose::Training), 12, case.speed, rate)?;
-    let learned = LearningLoop {
-        closed_loop: &closed_loop,
-        model: model.as_ref().map(|model| (model, Lanes::BOTH)),
-        parts: case.parts,
-        seed,
+    let fly = |closed_loop: &Loop, test: &[Trajectory], seed: u64| {
+        let model = model.as_ref().map(|model| (model, Lanes::BOTH));
+        let learned = LearningLoop { closed_loop, model, parts: case.parts, guessed: case.guessed, seed };
+        match case.seconds {
+            Seconds::FromFirstStroke => one_after_another(&learned, test, case.then_later_s),
+            Seconds::After(seconds) => after(&learned, seconds, &teach, test),
+        }
     };
-    let flown = match case.seconds {
-        Seconds::FromFirstStroke => one_after_another(&learned, &test, case.then_later_s),
-        Seconds::After(seconds) => after(&learned, seconds, &teach, &test),
+    let flown = if case.draws == 0 {
+        fly(&closed_loop, &test, seed)
+    } else {
+        let draws = (0..case.draws).into_par_iter().map(|draw| {
+            let drawn = Ranges::default().mismatch(settings.seed, draw).applied(&closed_loop);
+            let first = draw as usize * DRAW_STROKES;
+            let own: Vec<Trajectory> = (first..first + DRAW_STROKES).map(|stroke| test[stroke % test.len()].clone()).collect();
+            fly(&drawn, &own, seed.wrapping_add(first as u64))
+        });
+        draws.collect::<Result<Vec<Flown>, _>>().map(Flown::together)
     };
     Ok(Row::new(case, settings.seed, &flown.with_context(|| case.name())?))
 }

@@ -1,9 +1,9 @@
 //! The flights of an experiment: one vehicle with its gains under one condition.
 
-use impromptu_firmware::{adapter::Lanes, guard::GuardSettings, model::Model};
+use impromptu_firmware::{adapter::Lanes, guard::GuardSettings, learning::Response, model::Model};
 use impromptu_flight::{
     flight::Settings,
-    learning::{FlightLearning, Guess},
+    learning::{ATTITUDE, FlightLearning, Guess},
 };
 
 use crate::{
@@ -24,6 +24,22 @@ pub enum FlightsError {
     /// The rollout refuses.
     #[error(transparent)]
     Rollout(#[from] RolloutError),
+}
+
+/// How the response that a loop is guessed to have differs from what its gains say.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Guessed {
+    /// Factor on the gain at rest.
+    pub gain: f64,
+    /// Factor on the natural frequency.
+    pub speed: f64,
+    /// Further delay, s.
+    pub late_s: f64,
+}
+
+impl Guessed {
+    /// In nothing.
+    pub const RIGHT: Self = Self { gain: 1.0, speed: 1.0, late_s: 0.0 };
 }
 
 /// A vehicle, its gains and what it meets.
@@ -101,16 +117,21 @@ impl Loop {
     ///
     /// # Errors
     /// If the gains are not those of a loop of second order.
-    pub fn learning(&self) -> Result<FlightLearning, RolloutError> {
+    pub fn learning(&self, guessed: &Guessed) -> Result<FlightLearning, RolloutError> {
         let (age, rate) = (self.condition.measurement_delay_s as f32, self.rate_hz() as f32);
-        let kd = self.settings.position.kd;
-        // The Crazyflie's PID is given positions alone.
-        let drag = |axis: usize| if self.controller == Controller::Pid { kd[axis] } else { 0.0 };
-        let guesses = Guess::of(&self.settings, age).map(|guesses| {
-            let [x, y, z] = guesses;
-            [Guess { drag: drag(0), ..x }, Guess { drag: drag(1), ..y }, Guess { drag: drag(2), ..z }]
+        let position = &self.settings.position;
+        let learning = Guess::of(&self.settings, age).and_then(|mut guesses| {
+            for (guess, (kp, kd)) in guesses.iter_mut().zip(position.kp.iter().zip(&position.kd)) {
+                let frequency = kp.sqrt();
+                let delay = age + ATTITUDE + guessed.late_s as f32;
+                let (gain, speed) = (guessed.gain as f32, guessed.speed as f32);
+                guess.response = Response::second_order(gain, speed * frequency, 0.5 * kd / frequency, delay, rate)?;
+                // The Crazyflie's PID is given positions alone.
+                guess.drag = if self.controller == Controller::Pid { *kd } else { 0.0 };
+            }
+            FlightLearning::new(&guesses, rate, age)
         });
-        guesses.and_then(|guesses| FlightLearning::new(&guesses, rate, age)).ok_or_else(|| {
+        learning.ok_or_else(|| {
             RolloutError::Airframe(format!("gains `{}`: no loop of second order, whose response could be guessed", self.gains))
         })
     }

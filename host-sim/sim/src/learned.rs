@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::{
     flight_log::{FlightLog, LogRow},
-    flights::Loop,
+    flights::{Guessed, Loop},
     rollout::{FlightPlan, RolloutError},
     trajectory::Trajectory,
 };
@@ -29,6 +29,8 @@ pub struct LearningLoop<'a> {
     pub model: Option<(&'a Model<'a>, Lanes)>,
     /// Parts that learn and act.
     pub parts: Parts,
+    /// What is known of the response.
+    pub guessed: Guessed,
     /// Of the first flight; each has its own.
     pub seed: u64,
 }
@@ -48,9 +50,22 @@ pub struct Flown {
     pub forgotten: u32,
 }
 
+impl Flown {
+    /// Flights of several vehicles as those of one.
+    pub fn together(all: impl IntoIterator<Item = Self>) -> Self {
+        all.into_iter().fold(Self::default(), |mut sum, flown| {
+            sum.baseline.extend(flown.baseline);
+            sum.errors.extend(flown.errors);
+            sum.seconds += flown.seconds;
+            sum.forgotten += flown.forgotten;
+            sum
+        })
+    }
+}
+
 impl<'a> LearningLoop<'a> {
     fn nothing(&self) -> Result<FlightLearning, RolloutError> {
-        let mut learning = self.closed_loop.learning()?;
+        let mut learning = self.closed_loop.learning(&self.guessed)?;
         learning.switch(self.parts, self.parts);
         Ok(learning)
     }
@@ -177,7 +192,7 @@ pub fn second_by_second(
     seed: u64,
 ) -> Result<[Vec<(f64, f64)>; 2], RolloutError> {
     let fly = |strokes: &Vec<Trajectory>| {
-        let mut learning = closed_loop.learning()?;
+        let mut learning = closed_loop.learning(&Guessed::RIGHT)?;
         let mut squares = [Vec::new(), Vec::new()];
         for (stroke, seed) in strokes.iter().zip(seed..) {
             let plan = FlightPlan { log: true, ..FlightPlan::new(stroke, seed) };

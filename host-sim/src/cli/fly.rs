@@ -18,6 +18,7 @@ use impromptu_pil::LinkKind;
 use impromptu_report::{Method, PerFlight};
 use impromptu_sim::{
     controller::Controller,
+    flights::Guessed,
     learned::{LearningLoop, taught},
     rollout::{FlightPlan, FlightRecord},
     trajectory::strokes,
@@ -198,7 +199,8 @@ impl Fly {
             closed_loop.fly(&plans).with_context(|| file.as_ref().map_or_else(|| trajectory.name.clone(), ModelFile::name))?;
         if let Some(seconds) = self.learn {
             let model = model.as_ref().map(|model| (model, self.lanes.lanes()));
-            let learned = LearningLoop { closed_loop: &closed_loop, model, parts: Parts::BOTH, seed: flight_seed };
+            let learned =
+                LearningLoop { closed_loop: &closed_loop, model, parts: Parts::BOTH, guessed: Guessed::RIGHT, seed: flight_seed };
             let teach = teaching(&closed_loop, self.speed, flight_seed, seconds)?;
             let (mut learning, _) = taught(&learned, seconds, &teach)?;
             let plan = FlightPlan { model, log: true, ..FlightPlan::new(&trajectory, flight_seed) };

@@ -41,7 +41,7 @@ fn the_demo_prints_one_document_and_leaves_its_files() {
 
     let run = folder.fine("--config demo.toml --seed 4 --out here --format json");
     let table = run.json()["table"].as_array().unwrap().clone();
-    assert_eq!(table.len(), 10);
+    assert_eq!(table.len(), 11);
     assert_eq!((table[9]["method"].as_str(), table[9]["seed"].as_u64()), (Some("full_int8"), Some(4)));
     assert!(table[9]["reduction_mean"].as_f64().unwrap() > 80.0, "{}", table[9]);
     assert!(run.stderr.contains("seed 4") && run.stderr.contains("here/report.html"), "{}", run.stderr);

@@ -4,7 +4,13 @@
 //! flight.
 
 use impromptu_firmware::learning::Parts;
-use impromptu_sim::{condition::Condition, controller::Controller, flights::Loop, plant::Vehicle, rollout::RolloutError};
+use impromptu_sim::{
+    condition::Condition,
+    controller::Controller,
+    flights::{Guessed, Loop},
+    plant::Vehicle,
+    rollout::RolloutError,
+};
 
 use super::seconds::Seconds;
 use crate::robustness::Mismatch;
@@ -59,6 +65,10 @@ pub struct Case {
     pub seconds: Seconds,
     /// Learned parts.
     pub parts: Parts,
+    /// How wrong the guess of the response is.
+    pub guessed: Guessed,
+    /// Vehicles that are drawn, each of which flies some of the strokes; 0: the one that is named.
+    pub draws: u32,
     /// More delay in the loop once it has learned, s.
     pub then_later_s: f64,
     /// Least mean and worst reduction, %.
@@ -84,6 +94,8 @@ const PLAIN: Case = Case {
     start: Start::Nothing,
     seconds: Seconds::FromFirstStroke,
     parts: Parts::BOTH,
+    guessed: Guessed::RIGHT,
+    draws: 0,
     then_later_s: 0.0,
     asked: None,
 };
@@ -188,6 +200,18 @@ pub fn cases() -> Vec<Case> {
         all.push(Case { seconds: Seconds::After(60), asked, ..mellinger });
         all.push(Case { then_later_s: 0.02, asked: later, ..mellinger });
     }
+    for (what, gain, speed, late_s) in [
+        ("response guessed with gain x0.5", 0.5, 1.0, 0.0),
+        ("response guessed with gain x2", 2.0, 1.0, 0.0),
+        ("response guessed 50 ms late", 1.0, 1.0, 0.05),
+        ("response guessed 100 ms late", 1.0, 1.0, 0.1),
+        ("response guessed half as fast", 1.0, 0.5, 0.0),
+        ("response guessed twice as fast", 1.0, 2.0, 0.0),
+    ] {
+        let guessed = Guessed { gain, speed, late_s };
+        all.push(Case { what, guessed, ..PLAIN });
+        all.push(Case { what, guessed, controller: Controller::Pid, speed: PID_SPEED, ..PLAIN });
+    }
     // On top of a model with both of its lanes.
     let model = |start, seconds, asked| Case { start, seconds: Seconds::After(seconds), asked, ..PLAIN };
     all.push(model(Start::Same, 0, None));
@@ -204,6 +228,8 @@ pub fn cases() -> Vec<Case> {
     }
     all.push(Case { what: "steady wind of 6 m/s", wind: 6.0, ..model(Start::Same, 10, Some([95.0, 90.0])) });
     all.push(Case { gains: "soft", ..model(Start::OtherGains, 30, Some([92.0, 85.0])) });
+    let drawn = Case { vehicle: "crazyflie-brushless", what: "200 drawn vehicles", draws: 200, ..model(Start::Same, 10, None) };
+    all.push(Case { asked: Some([95.5, 85.0]), ..drawn });
     let weak = Mismatch { thrust: 0.91, ..Mismatch::NONE };
     all.push(Case { speed: 1.7, what: "thrust -9 %", mismatch: weak, ..model(Start::Same, 30, Some([94.0, 88.0])) });
     all

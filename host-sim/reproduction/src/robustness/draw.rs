@@ -51,6 +51,23 @@ impl Default for Ranges {
 }
 
 impl Ranges {
+    /// The vehicle and the air of a draw of a run with a seed.
+    pub fn mismatch(&self, seed: u64, draw: u32) -> Mismatch {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(derived(seed, Purpose::Test) ^ (u64::from(draw) << 20));
+        let mut between = |[low, high]: [f64; 2]| low + (high - low) * random.random::<f64>();
+        Mismatch {
+            mass: between(self.mass),
+            thrust: between(self.thrust),
+            drag: between(self.drag),
+            inertia: between(self.inertia),
+            motor_lag: between(self.motor_lag),
+            delay_s: between(self.delay_s),
+            wind: between(self.wind),
+            wind_direction: between([0.0, std::f64::consts::TAU]),
+            ..Mismatch::NONE
+        }
+    }
+
     /// The first range that no vehicle can be drawn from: its values and what is allowed.
     pub fn fault(&self) -> Option<String> {
         let allowed = [
@@ -116,20 +133,7 @@ impl DrawSettings {
 
     /// The vehicle and the air of a draw.
     pub fn mismatch(&self, draw: u32) -> Mismatch {
-        let mut random = Xoshiro256PlusPlus::seed_from_u64(derived(self.seed, Purpose::Test) ^ (u64::from(draw) << 20));
-        let mut between = |[low, high]: [f64; 2]| low + (high - low) * random.random::<f64>();
-        let ranges = &self.ranges;
-        Mismatch {
-            mass: between(ranges.mass),
-            thrust: between(ranges.thrust),
-            drag: between(ranges.drag),
-            inertia: between(ranges.inertia),
-            motor_lag: between(ranges.motor_lag),
-            delay_s: between(ranges.delay_s),
-            wind: between(ranges.wind),
-            wind_direction: between([0.0, std::f64::consts::TAU]),
-            ..Mismatch::NONE
-        }
+        self.ranges.mismatch(self.seed, draw)
     }
 }
 
