@@ -6,9 +6,9 @@ use impromptu_report::{FlightTrace, LaneOutcome, Margins, Method, ModelCard, Per
 use impromptu_sim::{
     flight_log::FlightLog,
     flights::{Guessed, Loop},
-    learned::{LearningLoop, after},
+    learned::{LearningLoop, after, teaching},
     rollout::{FlightPlan, RolloutError},
-    trajectory::{Trajectory, TrajectoryError, strokes},
+    trajectory::{Trajectory, TrajectoryError},
 };
 use impromptu_training::build::Built;
 
@@ -95,23 +95,10 @@ pub fn learned(
     flight_seed: u64,
     seconds: u32,
 ) -> Result<Vec<f64>, EvaluationError> {
-    let teach = teaching(closed_loop, speed, flight_seed, seconds)?;
+    let teach = teaching(flight_seed, seconds, speed, closed_loop.rate_hz())?;
     let learned = LearningLoop { closed_loop, model, parts: Parts::BOTH, guessed: Guessed::RIGHT, seed: flight_seed };
     Ok(after(&learned, seconds, &teach, trajectories)?.errors)
 }
-
-/// Strokes of so many seconds and more that teach, none of which is judged.
-///
-/// # Errors
-/// If they cannot be sampled.
-pub fn teaching(closed_loop: &Loop, speed: f64, flight_seed: u64, seconds: u32) -> Result<Vec<Trajectory>, TrajectoryError> {
-    // A stroke takes ten seconds and more at normal speed.
-    let count = 1 + (f64::from(seconds) * speed.max(0.05) / 10.0).ceil() as usize;
-    strokes(flight_seed ^ TEACHING, count, speed, closed_loop.rate_hz())
-}
-
-/// Between the seeds of strokes that are judged and those that teach.
-const TEACHING: u64 = 0x7ea_c413;
 
 /// Flights as they are reported, of their RMS errors and the baseline's over the same trajectories, m.
 pub fn per_flight(

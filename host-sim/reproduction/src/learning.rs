@@ -19,7 +19,7 @@ use impromptu_firmware::{adapter::Lanes, model::Model};
 use impromptu_report::{Figure, study::Study};
 use impromptu_sim::{
     flights::Loop,
-    learned::{Flown, LearningLoop, after, one_after_another, second_by_second},
+    learned::{Flown, LearningLoop, after, one_after_another, second_by_second, teaching},
     trajectory::{Trajectory, strokes},
 };
 use impromptu_training::{Purpose, Recipe, build, derived, observer::Observer};
@@ -112,7 +112,11 @@ fn fly(settings: &Settings, case: &Case, models: &BTreeMap<String, Vec<u8>>) -> 
     let seed = derived(settings.seed, Purpose::Test);
     let rate = closed_loop.rate_hz();
     let test = strokes(seed, settings.strokes, case.speed, rate)?;
-    let teach = strokes(derived(settings.seed, Purpose::Training), 12, case.speed, rate)?;
+    let motion_s = match case.seconds {
+        Seconds::FromFirstStroke => 0,
+        Seconds::After(seconds) => seconds,
+    };
+    let teach = teaching(seed, motion_s, case.speed, rate)?;
     let fly = |closed_loop: &Loop, test: &[Trajectory], seed: u64| {
         let model = model.as_ref().map(|model| (model, Lanes::BOTH));
         let learned = LearningLoop { closed_loop, model, parts: case.parts, guessed: case.guessed, seed };

@@ -12,13 +12,15 @@ use crate::{
     flight_log::{FlightLog, LogRow},
     flights::{Guessed, Loop},
     rollout::{FlightPlan, RolloutError},
-    trajectory::Trajectory,
+    trajectory::{Trajectory, TrajectoryError, stroke},
 };
 
 /// Strokes that are not judged where they are flown one after another.
 const FIRST: usize = 4;
 /// Between the seeds of the flights that teach and those that are judged.
 const OTHER_SEEDS: u64 = 1 << 32;
+/// The same of strokes.
+const OTHER_STROKES: u64 = 0x7ea_c413;
 
 /// What learns.
 #[derive(Clone, Copy, Debug)]
@@ -116,6 +118,17 @@ pub fn one_after_another(learned: &LearningLoop<'_>, strokes: &[Trajectory], lat
         seconds: flown,
         forgotten: learning.forgotten().into(),
     })
+}
+
+/// Strokes of so many seconds of motion and more that teach, none of which is judged: those that leave their plane, so that every
+/// axis moves.
+///
+/// # Errors
+/// If they cannot be sampled.
+pub fn teaching(seed: u64, motion_s: u32, speed: f64, rate_hz: f64) -> Result<Vec<Trajectory>, TrajectoryError> {
+    // One takes eight seconds and more at normal speed.
+    let count = 1 + (f64::from(motion_s) * speed / 8.0).ceil() as u64;
+    (0..count).map(|index| stroke(seed ^ OTHER_STROKES, 4 * index + 3).scaled(speed).sampled(rate_hz)).collect()
 }
 
 /// What so many seconds of motion of strokes teach, flown one after another, and how long they took with their rests, s.

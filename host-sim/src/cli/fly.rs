@@ -7,7 +7,7 @@ use std::{
 
 use anyhow::{Context as _, Result, bail};
 use clap::{Args, ValueEnum};
-use impromptu_experiment::evaluation::{per_flight, teaching};
+use impromptu_experiment::evaluation::per_flight;
 use impromptu_files::text::line;
 use impromptu_firmware::{
     adapter::Lanes,
@@ -19,7 +19,7 @@ use impromptu_report::{Method, PerFlight};
 use impromptu_sim::{
     controller::Controller,
     flights::Guessed,
-    learned::{LearningLoop, taught},
+    learned::{LearningLoop, taught, teaching},
     rollout::{FlightPlan, FlightRecord},
     trajectory::strokes,
 };
@@ -201,7 +201,7 @@ impl Fly {
             let model = model.as_ref().map(|model| (model, self.lanes.lanes()));
             let learned =
                 LearningLoop { closed_loop: &closed_loop, model, parts: Parts::BOTH, guessed: Guessed::RIGHT, seed: flight_seed };
-            let teach = teaching(&closed_loop, self.speed, flight_seed, seconds)?;
+            let teach = teaching(flight_seed, seconds, self.speed, closed_loop.rate_hz())?;
             let (mut learning, _) = taught(&learned, seconds, &teach)?;
             let plan = FlightPlan { model, log: true, ..FlightPlan::new(&trajectory, flight_seed) };
             records.push(closed_loop.fly_learning(&plan, &mut learning)?);

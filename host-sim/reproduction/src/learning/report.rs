@@ -15,9 +15,9 @@ pub(super) fn tell(study: &mut Study, settings: &Settings, cases: &[Case], rows:
         SECTION,
         &format!(
             "{} unseen strokes a row. Nothing is known of a loop but a guess of its response from the gains of its position \
-             loop. `After N s`: N seconds of motion taught, then each stroke is flown by itself with what they taught, and \
-             goes on learning. `From the first stroke on`: one stroke after another, the first four are not judged. Reductions \
-             are against the baseline's flight of the same vehicle in the same air.",
+             loop. `After N s`: N seconds of motion along every axis taught, then each stroke is flown by itself with what \
+             they taught, and goes on learning. `From the first stroke on`: one stroke after another, the first four are not \
+             judged. Reductions are against the baseline's flight of the same vehicle in the same air.",
             settings.strokes
         ),
     );
