@@ -1,7 +1,8 @@
-//! Layers, networks and flights give the same bits on every core and in WebAssembly: the kernels in assembly, their portable twin
-//! beside them, and this machine's.
+//! Layers, networks, flights and learners give the same bits on every core and in WebAssembly: the kernels in assembly, their
+//! portable twin beside them, and this machine's.
 
 mod layers;
+mod learner;
 mod web_assembly;
 
 use std::{fs, path::Path};
@@ -52,6 +53,7 @@ fn cases(layers: usize, room: usize, flights: bool) -> Cases {
     }
     assert!(evaluated >= 2, "integer networks too");
 
+    learner::add(&mut cases);
     for precision in [Precision::Int8, Precision::Float].into_iter().filter(|_| flights) {
         let file = model::file(&model::TANH, precision);
         let model = Model::from_bytes(&file).unwrap();

@@ -2,6 +2,7 @@
 
 use anyhow::{Context, Result, anyhow, ensure};
 use impromptu_firmware::{
+    learning::{AHEAD, Learner, Limits, Measured, Parts, Response},
     model::Model,
     network::{
         Scratch,
@@ -12,6 +13,7 @@ use impromptu_firmware::{
 /// Kinds of cases, see `firmware/board/twins/src/lib.rs`.
 const NETWORK: u32 = 3;
 const FLIGHT: u32 = 4;
+const LEARNER: u32 = 5;
 const END: u32 = 9;
 
 /// What a layer does with its sums.
@@ -106,6 +108,31 @@ impl Cases {
     pub fn flight(&mut self, name: &str, file: &[u8], recording: &[u8], answers: &[u8]) {
         let header = [FLIGHT, file.len() as u32, 0, 0, 0, 0, 0, 0];
         self.add(&header, [padded(file), recording.to_vec()], (format!("flight {name}"), answers.to_vec()));
+    }
+
+    /// Adds a learner beside a loop: what is desired, from the first tick to [`AHEAD`] ticks behind the last one, and what is
+    /// measured and its rate of change at each tick.
+    ///
+    /// # Errors
+    /// If the lengths do not go together.
+    pub fn learner(&mut self, name: &str, desired: &[f32], measured: &[[f32; 2]]) -> Result<()> {
+        ensure!(desired.len() == measured.len() + AHEAD as usize, "{name}: {} values are desired", desired.len());
+        let response = Response::second_order(1.0, 2.55, 0.78, 0.08, 100.0);
+        let limits = Limits { scale: 1.0, correction: 2.0, feedback: 0.3, rate: 40.0 };
+        let learner = response.and_then(|response| Learner::new(response, 100.0, 0.024, limits));
+        let mut learner = learner.context("a learner")?;
+        learner.start(desired[0]);
+        let (mut expected, mut words) = (Vec::new(), Vec::new());
+        for (tick, [value, rate]) in measured.iter().copied().enumerate() {
+            let at = |offset: i32| desired[(tick as i32 + offset).max(0) as usize];
+            let correction = learner.step(at, Some(Measured { value, rate }), Parts::BOTH, Parts::BOTH);
+            expected.push(correction.to_bits());
+            words.extend([desired[tick + AHEAD as usize], value, rate].map(f32::to_bits));
+        }
+        let first: Vec<u32> = desired.iter().take(AHEAD as usize).map(|value| value.to_bits()).collect();
+        let header = [LEARNER, measured.len() as u32, 0, 0, 0, 0, 0, 0];
+        self.add(&header, [bytes(&first), bytes(&words)], (format!("learner {name}"), bytes(&expected)));
+        Ok(())
     }
 
     fn add(&mut self, header: &[u32; 8], data: [Vec<u8>; 2], expected: (String, Vec<u8>)) {

@@ -1,4 +1,5 @@
-//! Computes on one machine what another computes too, so that their bits can be compared: layers, networks, whole flights.
+//! Computes on one machine what another computes too, so that their bits can be compared: layers, networks, whole flights,
+//! learners.
 //!
 //! *in* cases, one after the other; *out* the words of their outputs, and how many there were; *never* a judgement whether the
 //! outputs are right: the host compares them with its own; *source* this page is the format's specification.
@@ -11,18 +12,20 @@
 //! | 0 int8, 1 int16, 2 f32 | as in `layer.rs` | inputs, stream | words of the assembly, where there is one, else of the twin |
 //! | 3 network | rows, inputs, outputs, bytes of the model file, zeros | model file, rows of f32 | rows of f32 |
 //! | 4 flight | bytes of the model file, zeros | model file, recording ([`impromptu_flight::replay`]) | its answers |
+//! | 5 learner | ticks, zeros | as in `learning.rs` | its corrections |
 //! | 9 end | zeros | | |
 //!
 //! # Layers
 //! | layer | modules | what they hold |
 //! |--:|---|---|
 //! | 1 | `case` | memory, numbers, failures |
-//! | 2 | `layer`, `network`, `flight` | a case of each kind |
+//! | 2 | `layer`, `network`, `flight`, `learning` | a case of each kind |
 #![no_std]
 
 mod case;
 mod flight;
 mod layer;
+mod learning;
 mod network;
 
 use embedded_io::{Read, Write};
@@ -30,7 +33,7 @@ use embedded_io::{Read, Write};
 use case::read_words;
 pub use case::{Counts, Failure, Memory};
 
-/// Runs all cases. `mark` is called before and after each evaluation of a network.
+/// Runs all cases. `mark` is called before and after each evaluation of a network, and each tick of a learner.
 ///
 /// # Errors
 /// If the cases cannot be read, do not fit into `memory` or are refused, or the outputs cannot be written.
@@ -52,6 +55,7 @@ pub fn run<const WORDS: usize>(
                 network::run([rows, inputs, results, file].map(|count| count as usize), cases, outputs, memory, &mark)?;
             }
             [4, file, ..] => flight::run(file as usize, cases, outputs, memory)?,
+            [5, ticks, ..] => learning::run(ticks, cases, outputs, &mark)?,
             [9, ..] => return Ok(counts),
             _ => return Err(Failure("a case of unknown kind")),
         }

@@ -36,7 +36,15 @@ fn place(axis: &Axis, value: f64) -> f64 {
 }
 
 fn text(axis: &Axis, value: f64, decimals: usize) -> String {
-    if axis.logarithmic { format!("{:.1e}", 10f64.powf(value)).replace(".0e", "e") } else { fixed(value, decimals) }
+    let number = 10f64.powf(value);
+    match number {
+        _ if !axis.logarithmic => fixed(value, decimals),
+        // Two digits, as a reader writes them.
+        10.0..1e4 => format!("{number:.0}"),
+        1.0..10.0 => format!("{number:.1}").trim_end_matches(".0").to_owned(),
+        0.1..1.0 => format!("{number:.2}").trim_end_matches('0').to_owned(),
+        _ => format!("{number:.1e}").replace(".0e", "e"),
+    }
 }
 
 /// The style sheet's variable with the colour of a curve.
