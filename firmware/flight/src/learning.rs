@@ -30,7 +30,7 @@ const FEEDBACK: f32 = 0.3;
 /// Time in which a correction may go from nothing to its limit, s.
 const RISE: f32 = 0.05;
 /// From the position loop's command to the vehicle's acceleration, s: an attitude loop of 20 rad/s.
-pub const ATTITUDE: f32 = 0.055;
+const ATTITUDE: f32 = 0.055;
 
 /// What is known of an axis: how its loop answers, and what a correction may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -135,7 +135,6 @@ impl FlightLearning {
         let goes_on = self.last.is_some_and(|last| last.wrapping_add(1) == now) && flight.airborne();
         self.last = Some(now);
         let known = state.is_physical();
-        // One row of the window at a time: ten channels of a setpoint hold three positions.
         let present = flight.setpoint(now);
         for (axis, (learner, guess)) in self.axes.iter_mut().zip(&self.guesses).enumerate() {
             let [velocity, acceleration] =

@@ -47,6 +47,12 @@ impl Response {
         Some(Self { gains: [first, second], poles, delay: libm::roundf(delay) as usize, turn })
     }
 
+    /// The same with so many times the gain.
+    #[must_use]
+    pub fn amplified(self, gain: f32) -> Self {
+        Self { gains: self.gains.map(|own| gain * own), ..self }
+    }
+
     /// Change of the output at rest after a correction of 1.
     pub fn gain(&self) -> f32 {
         let [first, second] = self.gains;

@@ -62,7 +62,7 @@ pub fn evaluate(
     let baseline = closed_loop.errors(trajectories, None, 1.0, flight_seed)?;
     let unguarded = closed_loop.unguarded();
     let mut flights = Vec::new();
-    // What several models would be beneath is left to `evaluate --learn`.
+    // What is learned on top of a model is for `evaluate --learn`.
     for method in Method::ALL.into_iter().filter(|method| *method != Method::FullLearned) {
         let errors = match flown_by(built, method) {
             None if method == Method::Learned => learned(closed_loop, None, trajectories, speed, flight_seed, LEARNED_SECONDS)?,
@@ -81,7 +81,7 @@ pub fn evaluate(
 }
 
 /// How long is learned before the flights that are judged, s of motion.
-pub const LEARNED_SECONDS: u32 = 60;
+const LEARNED_SECONDS: u32 = 60;
 
 /// RMS errors, m, over trajectories with what so many seconds of other strokes at that speed taught; each goes on learning.
 ///

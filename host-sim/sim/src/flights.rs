@@ -1,9 +1,10 @@
 //! The flights of an experiment: one vehicle with its gains under one condition.
 
-use impromptu_firmware::{adapter::Lanes, guard::GuardSettings, learning::Response, model::Model};
+use impromptu_firmware::{adapter::Lanes, guard::GuardSettings, model::Model};
 use impromptu_flight::{
+    control::PositionGains,
     flight::Settings,
-    learning::{ATTITUDE, FlightLearning, Guess},
+    learning::{FlightLearning, Guess},
 };
 
 use crate::{
@@ -119,15 +120,17 @@ impl Loop {
     /// If the gains are not those of a loop of second order.
     pub fn learning(&self, guessed: &Guessed) -> Result<FlightLearning, RolloutError> {
         let (age, rate) = (self.condition.measurement_delay_s as f32, self.rate_hz() as f32);
-        let position = &self.settings.position;
-        let learning = Guess::of(&self.settings, age).and_then(|mut guesses| {
-            for (guess, (kp, kd)) in guesses.iter_mut().zip(position.kp.iter().zip(&position.kd)) {
-                let frequency = kp.sqrt();
-                let delay = age + ATTITUDE + guessed.late_s as f32;
-                let (gain, speed) = (guessed.gain as f32, guessed.speed as f32);
-                guess.response = Response::second_order(gain, speed * frequency, 0.5 * kd / frequency, delay, rate)?;
+        let PositionGains { kp, kd, .. } = self.settings.position;
+        let speed = guessed.speed as f32;
+        // As fast as that, with the same damping.
+        let position =
+            PositionGains { kp: kp.map(|kp| speed * speed * kp), kd: kd.map(|kd| speed * kd), ..self.settings.position };
+        let wrong = Guess::of(&Settings { position, ..self.settings }, age + guessed.late_s as f32);
+        let learning = Guess::of(&self.settings, age).zip(wrong).and_then(|(mut guesses, wrong)| {
+            for ((guess, wrong), kd) in guesses.iter_mut().zip(&wrong).zip(kd) {
+                guess.response = wrong.response.amplified(guessed.gain as f32);
                 // The Crazyflie's PID is given positions alone.
-                guess.drag = if self.controller == Controller::Pid { *kd } else { 0.0 };
+                guess.drag = if self.controller == Controller::Pid { kd } else { 0.0 };
             }
             FlightLearning::new(&guesses, rate, age)
         });

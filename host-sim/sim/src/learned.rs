@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::{
     flight_log::{FlightLog, LogRow},
-    flights::{Guessed, Loop},
+    flights::{Guessed, Loop, reduction},
     rollout::{FlightPlan, RolloutError},
     trajectory::{Trajectory, TrajectoryError, stroke},
 };
@@ -101,8 +101,7 @@ pub fn one_after_another(learned: &LearningLoop<'_>, strokes: &[Trajectory], lat
     for (stroke, seed) in strokes.iter().zip(learned.seed..) {
         errors.push(learned.fly(closed_loop, stroke, seed, &mut learning)?);
     }
-    let reduction = |(baseline, error): (&f64, &f64)| 100.0 * (1.0 - error / baseline);
-    let first = baseline.iter().zip(&errors).map(reduction).next();
+    let first = baseline.first().zip(errors.first()).map(|(baseline, error)| reduction(&[*baseline], &[*error]).0);
     let flown: f64 = strokes.iter().map(seconds).sum();
     if later_s > 0.0 {
         let later = closed_loop.delayed(later_s);

@@ -187,7 +187,7 @@ impl Fly {
         let seed = invocation.configuration.seed();
         let flight_seed = invocation.configuration.seed_of(Purpose::Test);
         invocation.console.note(&format!("seed {seed}"));
-        let baseline = FlightPlan { log: true, ..FlightPlan::new(&trajectory, flight_seed) };
+        let baseline = FlightPlan { log: model.is_none() && self.learn.is_none(), ..FlightPlan::new(&trajectory, flight_seed) };
         let mut methods = vec![Method::Baseline];
         let mut plans = vec![baseline];
         if let Some(model) = &model {
