@@ -348,6 +348,19 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.model.map_or([0.0; MAX_OUTPUTS], |model| self.correction.of_outputs(model.card()))
     }
 
+    /// What the feedback lane corrected of each reference channel in the last tick, in the channel's unit.
+    pub fn fed_back(&self) -> [f32; R] {
+        let (mut channels, card) = ([0.0; R], self.model.map(Model::card));
+        let Some((card, layout)) = card.and_then(|card| Some((card, card.feedback.as_ref()?))) else { return channels };
+        for (axis, applied) in layout.axes.iter().zip(self.feedback.last()) {
+            let channel = card.outputs.get(usize::from(axis.output)).map(|output| usize::from(output.channel));
+            if let Some(place) = channel.and_then(|channel| channels.get_mut(channel)) {
+                *place += applied;
+            }
+        }
+        channels
+    }
+
     /// How far the network lane and the feedback lane are faded in, 0..=1.
     pub fn weights(&self) -> [f32; 2] {
         [self.network_weight, self.feedback_weight]

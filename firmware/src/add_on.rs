@@ -200,9 +200,7 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
             return Err(PushError::NotFinite { channel });
         }
         // The oldest sample goes: it must have been flown.
-        if self.preview.is_full()
-            && self.adapter.last_tick().is_none_or(|tick| self.preview.oldest_tick().wrapping_sub(tick) >= 0)
-        {
+        if self.preview.is_ahead_full(self.adapter.last_tick()) {
             return Err(PushError::Full);
         }
         self.preview.push(desired);
@@ -324,6 +322,11 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
     /// States that these measured channels have noise in them ([`Adapter::expect_noise`]).
     pub fn expect_noise(&mut self, channels: impl IntoIterator<Item = usize>, ticks: u16) {
         self.adapter.expect_noise(channels, ticks);
+    }
+
+    /// What the feedback lane corrected of each reference channel in the last tick ([`Adapter::fed_back`]).
+    pub fn fed_back(&self) -> [f32; R] {
+        self.adapter.fed_back()
     }
 
     /// States whether the loop moves the machine ([`Adapter::set_airborne`]).

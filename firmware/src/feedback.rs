@@ -165,6 +165,12 @@ impl AxisState {
         push(&mut self.outputs, lane.lags, finite_or_zero(value));
     }
 
+    /// What was really applied of its output last.
+    pub fn last(&self) -> f32 {
+        let [last, ..] = self.outputs;
+        last
+    }
+
     /// Empties the integral: the lane is faded out.
     pub fn clear_integral(&mut self) {
         self.integral = 0.0;

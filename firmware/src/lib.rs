@@ -70,8 +70,8 @@
 //! | 1 | `lanes` | which of the two lanes act |
 //! | 1 | `exchange` | hand-over between tasks without a lock: newest value, queue of bytes |
 //! | 2 | `format` | a model file: its bytes, the types that they become, why one is refused |
-//! | 2 | `learning` | parts of a correction that are learned while the loop runs |
 //! | 2 | `region` | which of several modules acts, by operating region |
+//! | 3 | `learning` | parts of a correction that are learned while the loop runs |
 //! | 3 | `caps` | bounds of the correction that the application sets |
 //! | 3 | `preview` | the desired trajectory around the present |
 //! | 3 | `features` | network inputs, evaluated from the list in the model |

@@ -82,6 +82,11 @@ impl<const D: usize, const N: usize> Preview<D, N> {
         self.stored == N
     }
 
+    /// Whether the next sample pushes out one that is still to be flown after the tick `flown`; before the first, all are.
+    pub fn is_ahead_full(&self, flown: Option<i32>) -> bool {
+        self.is_full() && flown.is_none_or(|tick| self.oldest_tick().wrapping_sub(tick) >= 0)
+    }
+
     /// Whether nothing is stored.
     pub fn is_empty(&self) -> bool {
         self.stored == 0

@@ -32,6 +32,8 @@
 //! model are refused ([`Refusal::Unsigned`], [`Refusal::Signature`], [`Refusal::Downgrade`]), and what is stored stays. Only the
 //! file stands in the header; the trailer lies behind it.
 //!
+//! What a machine learned is kept in a slot of its own, a [`Journal`].
+//!
 //! The crates that keep data in NOR flash do not serve: `sequential-storage` 8 and `ekv` 1 copy an item out of pages into a
 //! buffer, where the kernels read a model of up to 100 KB in place, contiguous and on a boundary of 16 bytes. The former's items
 //! are shorter than 64 KB, the latter's records are cut into chunks; both are async. Only the traits of `embedded-storage` are
@@ -39,6 +41,7 @@
 
 mod error;
 mod header;
+mod journal;
 mod ram;
 #[cfg(feature = "signed")]
 mod signed;
@@ -50,6 +53,7 @@ use crate::{format::Refusal, model::Model, network::Scratch};
 
 pub use error::{Operation, StorageError};
 pub use header::{HEADER, Header, MAGIC, Sequence, VERSION};
+pub use journal::{Journal, newest};
 pub use ram::RamFlash;
 #[cfg(feature = "signed")]
 pub use signed::{Key, Signers};

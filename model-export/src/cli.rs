@@ -19,7 +19,10 @@ use std::{
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
 use impromptu_files::text::line;
-use impromptu_firmware::model::Model;
+use impromptu_firmware::{
+    learning::{Kept, NotKept},
+    model::Model,
+};
 
 use self::{
     ambiguous::Ambiguous,
@@ -29,7 +32,7 @@ use self::{
     sign::{Keygen, Sign},
     verify::Verify,
 };
-use crate::inspection::Inspection;
+use crate::inspection::{Inspection, LearnedInspection};
 
 /// Exit code: all is well.
 pub const FINE: u8 = 0;
@@ -70,9 +73,9 @@ struct Arguments {
 enum Command {
     /// Writes a model file from a float network and its description.
     Export(Export),
-    /// Prints what a model file says of itself.
+    /// Prints what a model file, or what was learned in flight and kept, says of itself.
     Inspect {
-        /// Model file.
+        /// Model file, or kept state of a learner.
         file: PathBuf,
         /// How to print it.
         #[arg(long, value_enum, default_value_t)]
@@ -122,6 +125,15 @@ where
 
 fn inspect(file: &Path, format: Format, out: &mut dyn Write) -> Result<()> {
     let bytes = read(file)?;
+    match Kept::read(&bytes) {
+        Ok(kept) => {
+            let inspection = LearnedInspection::new(&kept);
+            return format.print(out, &inspection, || inspection.to_string());
+        }
+        // No file of this kind: a model, or nothing.
+        Err(NotKept::Nothing) => {}
+        Err(reason) => return Err(reason).with_context(|| file.display().to_string()),
+    }
     let bytes = unsigned(&bytes);
     let model = Model::from_bytes(bytes).with_context(|| file.display().to_string())?;
     let inspection = Inspection::new(&model, bytes);

@@ -3,6 +3,7 @@
 //! *in* a checked [`Model`]; *out* everything of its card but bulk numbers, indices replaced by names; *never* a number that the
 //! file does not hold or imply.
 
+mod learned;
 mod text;
 
 use impromptu_files::text::{line, mend};
@@ -14,6 +15,7 @@ use impromptu_firmware::{
 use serde::Serialize;
 
 use crate::description::{Provenance, Signals};
+pub use learned::{LearnedAxis, LearnedInspection, Weight};
 
 /// Everything that `inspect` prints.
 #[derive(Clone, Debug, PartialEq, Serialize)]

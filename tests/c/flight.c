@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "expect.h"
 #include "impromptu.h"
 
 #define MODEL_LIMIT 24576
@@ -15,23 +16,6 @@ static impromptu_scratch scratch, other_scratch;
 static impromptu_flight flight, split_flight;
 static impromptu_adapter adapter, split_adapter;
 static FILE *script, *answers;
-
-/* Ends the program with the line of a call that did not do as it should. */
-#define EXPECT(condition)                                    \
-    do {                                                     \
-        if (!(condition)) {                                  \
-            fprintf(stderr, "line %d: %s\n", __LINE__, #condition); \
-            return 1;                                        \
-        }                                                    \
-    } while (0)
-#define DO(call)                                                                              \
-    do {                                                                                      \
-        impromptu_status status = (call);                                                     \
-        if (status != IMPROMPTU_STATUS_OK) {                                                  \
-            fprintf(stderr, "line %d: %s\n", __LINE__, impromptu_status_text(status));        \
-            return 1;                                                                         \
-        }                                                                                     \
-    } while (0)
 
 static int get(void *place, size_t size)
 {
@@ -104,6 +88,9 @@ static int refusals(uint32_t length)
     EXPECT(impromptu_adapter_begin(&adapter, 0, numbers, 13, NULL, &due) == IMPROMPTU_STATUS_NULL);
     EXPECT(impromptu_adapter_begin(&adapter, 0, numbers, 12, &job, &due) == IMPROMPTU_STATUS_COUNT);
     EXPECT(impromptu_adapter_finish(&adapter, 0, numbers, 13, numbers, 5) == IMPROMPTU_STATUS_COUNT);
+    EXPECT(impromptu_adapter_fed_back(&adapter, numbers, 5) == IMPROMPTU_STATUS_COUNT);
+    EXPECT(impromptu_adapter_fed_back(&adapter, NULL, 6) == IMPROMPTU_STATUS_NULL);
+    DO(impromptu_adapter_fed_back(&adapter, numbers, 6));
     EXPECT(impromptu_adapter_step(&adapter, &scratch, 0, numbers, 13, numbers, 6) == IMPROMPTU_STATUS_NOT_CREATED);
     numbers[3] = 1e30f * 1e30f;
     EXPECT(impromptu_adapter_push(&adapter, numbers, 10) == IMPROMPTU_STATUS_NOT_FINITE);

@@ -1,5 +1,7 @@
 //! The C face: its header is up to date, strict compilers accept it, C programs get the bits of Rust, and no call does harm.
 
+mod learner;
+
 use std::{
     env, fs,
     path::{Path, PathBuf},
@@ -53,7 +55,7 @@ fn the_header_says_what_the_source_says() {
     let folder = c::crate_folder();
     let config = cbindgen::Config::from_file(folder.join("cbindgen.toml")).unwrap();
     let mut builder = cbindgen::Builder::new().with_config(config);
-    for file in ["status", "memory", "values", "edge/model", "edge/adapter", "edge/flight"] {
+    for file in ["status", "memory", "values", "values/learner", "edge/model", "edge/adapter", "edge/flight", "edge/learner"] {
         builder = builder.with_src(folder.join("src").join(file).with_extension("rs"));
     }
     let mut header = Vec::new();
@@ -179,30 +181,39 @@ fn floats<'a>(bytes: &mut Vec<u8>, numbers: impl IntoIterator<Item = &'a f32>) {
     numbers.into_iter().for_each(|number| bytes.extend(number.to_le_bytes()));
 }
 
-#[test]
-fn a_c_program_gets_the_bits_of_rust_here_and_on_the_emulated_board() {
-    let file = model::file(&model::TANH, Precision::Int8);
-    let (script, expected) = script(&file);
-    let mut machines = vec![(Machine::Host, "c-host", &[][..]), (Machine::Board, "c-board", &[])];
-    machines.extend(c::sanitizers(&folder("c-watched-small")).map(|flags| (Machine::Host, "c-watched", flags)));
+/// Runs a C program that reads a script: on the host, under sanitizers where the compiler has them, and on the emulated board.
+/// Each must answer what is expected; `check` looks at what it prints.
+fn answered_everywhere(prefix: &str, source: &str, script: &[u8], expected: &[u8], check: impl Fn(&str)) {
+    let [host, board, watched, small] = ["host", "board", "watched", "watched-small"].map(|name| format!("{prefix}-{name}"));
+    let mut machines = vec![(Machine::Host, host, &[][..]), (Machine::Board, board, &[])];
+    machines.extend(c::sanitizers(&folder(&small)).map(|flags| (Machine::Host, watched, flags)));
     for (machine, name, flags) in machines {
-        let folder = folder(name);
-        fs::write(folder.join("script.bin"), &script).unwrap();
-        let program = machine.program(&folder, flags, &["flight.c"]).unwrap();
-        let sizes = machine.run(&program, &folder, TIMEOUT).unwrap();
+        let folder = folder(&name);
+        fs::write(folder.join("script.bin"), script).unwrap();
+        let program = machine.program(&folder, flags, &[source]).unwrap();
+        let printed = machine.run(&program, &folder, TIMEOUT).unwrap();
         let answers = fs::read(folder.join("answers.bin")).unwrap();
-        let differs = answers.iter().zip(&expected).position(|(a, b)| a != b);
+        let differs = answers.iter().zip(expected).position(|(a, b)| a != b);
         assert!(
             differs.is_none() && answers.len() == expected.len(),
             "{name}: byte {differs:?}, {} of {}",
             answers.len(),
             expected.len()
         );
-        // The header's sizes are not much larger than needed: the caller pays for them.
-        let sizes: serde_json::Value = serde_json::from_str(&sizes).unwrap();
-        assert!(sizes["adapter"].as_u64().unwrap() > 12_288, "{sizes}");
-        println!("{name}: {sizes}");
+        check(&printed);
+        println!("{name}: {printed}");
     }
+}
+
+#[test]
+fn a_c_program_gets_the_bits_of_rust_here_and_on_the_emulated_board() {
+    let file = model::file(&model::TANH, Precision::Int8);
+    let (script, expected) = script(&file);
+    // The header's sizes are not much larger than needed: the caller pays for them.
+    answered_everywhere("c", "flight.c", &script, &expected, |printed| {
+        let sizes: serde_json::Value = serde_json::from_str(printed).unwrap();
+        assert!(sizes["adapter"].as_u64().unwrap() > 12_288, "{sizes}");
+    });
 }
 
 /// Makes so many random calls, under sanitizers where the compiler has them.
@@ -308,14 +319,24 @@ fn calls_from_c_need_no_more_stack_than_the_header_says() {
     println!("{used}");
     let used: serde_json::Map<String, serde_json::Value> = serde_json::from_str(&used).unwrap();
     let header = fs::read_to_string(c::include().join("impromptu.h")).unwrap();
-    for (call, kilobytes) in [("model_create", 4), ("adapter_create", 4), ("flight_attach", 4), ("flight_control", 4)] {
+    for (call, kilobytes) in [
+        ("model_create", 4),
+        ("adapter_create", 4),
+        ("flight_attach", 4),
+        ("flight_control", 4),
+        ("learner_create", 8),
+        ("learner_step", 8),
+        ("learner_keep", 4),
+        ("learner_recall", 8),
+    ] {
         let prototype = header.find(&format!("impromptu_{call}(")).unwrap();
         let comment = &header[header[..prototype].rfind("\n\n").unwrap()..prototype];
         assert!(comment.contains(&format!("{kilobytes} KB of stack")), "{call}: {comment}");
     }
     for (call, bytes) in &used {
         let limit = match call.as_str() {
-            "model_create" | "flight_control" | "adapter_create" | "flight_attach" => 4_096,
+            "model_create" | "flight_control" | "adapter_create" | "flight_attach" | "learner_keep" => 4_096,
+            "learner_create" | "learner_recall" | "commissioning" => 8_192,
             _ => 2_048,
         };
         assert!(bytes.as_u64().unwrap() <= limit, "{call} needs {bytes} bytes of stack");

@@ -1,12 +1,20 @@
 //! Processor in the loop: the binary that would be flashed flies the plant, tick by tick.
 
-use impromptu_firmware::{adapter::Lanes, model::Model};
-use impromptu_flight::{link::message::Telemetry, replay::ANSWER};
+use impromptu_firmware::{adapter::Lanes, learning::Phase, model::Model};
+use impromptu_flight::{
+    learning::KEPT,
+    link::{
+        Reason,
+        message::{LearnOrder, Telemetry},
+    },
+    replay::ANSWER,
+};
 use impromptu_model_export::Precision;
-use impromptu_pil::{self as pil, Board, Faults, Faulty, LinkKind};
+use impromptu_pil::{self as pil, Board, Faults, Faulty, LinkKind, PilError};
 use impromptu_sim::{
     condition::Condition,
     flights::Loop,
+    learned::commissioning,
     plant::Vehicle,
     rollout::{FlightPlan, fly_on},
     trajectory::strokes,
@@ -42,6 +50,78 @@ fn flights_through_the_firmware_have_every_bit_of_the_software_and_miss_no_deadl
     assert_eq!((figures.deadline_misses, figures.late_inferences, figures.dropped), (0, 0, 0));
     board.end();
     assert_eq!(emulated.ended().unwrap(), Some(0));
+}
+
+#[test]
+fn the_firmware_commissions_learns_and_keeps_across_a_power_cut_with_every_bit_of_the_software() {
+    let closed_loop = closed_loop();
+    let rate_hz = closed_loop.rate_hz();
+    let mut trajectories = vec![commissioning(rate_hz).unwrap()];
+    trajectories.extend(strokes(1, 3, 1.0, rate_hz).unwrap());
+    let plans: Vec<FlightPlan<'_>> = trajectories.iter().zip(7..).map(|(flown, seed)| FlightPlan::new(flown, seed)).collect();
+    let (hover, learned, next) = (&plans[..1], &plans[1..3], &plans[3..]);
+    let mut software = pil::learner(&closed_loop).unwrap();
+
+    let (emulated, mut board) = pil::start(None, LinkKind::Lockstep, 3).unwrap();
+    assert_eq!(board.introduce().unwrap(), None);
+    software.add_on().commission();
+    board.prepare(&closed_loop.settings, None).unwrap();
+    board.learn(LearnOrder::Commission).unwrap();
+    let refused = board.learn(LearnOrder::Keep).unwrap_err();
+    assert!(refused.to_string().contains("commission"), "{refused}");
+    let (_, report) = pil::fly_learning(&mut board, &closed_loop, hover, &mut software, |_| ()).unwrap();
+    assert!(report.bit_identical);
+    let told = *board.learning().unwrap();
+    assert_eq!((told.phase, told.problem, told.recalled), (Phase::Learning, None, false));
+    let (records, report) = pil::fly_learning(&mut board, &closed_loop, learned, &mut software, |_| ()).unwrap();
+    assert!(report.bit_identical && report.figures.deadline_misses == 0, "{report:?}");
+    let baseline = closed_loop.errors(&trajectories[1..], None, 1.0, 8).unwrap();
+    assert!(records[1].rms < 0.2 * baseline[1], "{} m, of {}", records[1].rms, baseline[1]);
+
+    let mut bytes = [0; KEPT];
+    let kept = software.keep(None, &mut bytes).unwrap();
+    for refused in [board.learned().unwrap_err(), board.learn(LearnOrder::Keep).unwrap_err()] {
+        assert!(matches!(refused, PilError::Refused { reason: Reason::Armed, .. }), "{refused}");
+    }
+    board.disarm().unwrap();
+    assert_eq!(board.learned().unwrap(), kept);
+    board.learn(LearnOrder::Keep).unwrap();
+    // What is forgotten is forgotten in RAM alone.
+    board.learn(LearnOrder::Forget).unwrap();
+    assert_ne!(board.learned().unwrap(), kept);
+
+    let (emulated, mut board) = pil::restart(emulated).unwrap();
+    board.introduce().unwrap();
+    let mut recalled = pil::learner(&closed_loop).unwrap();
+    recalled.recall(None, kept).unwrap();
+    assert_eq!(board.learned().unwrap(), kept);
+    board.learn(LearnOrder::Learn).unwrap();
+    let (records, report) = pil::fly_learning(&mut board, &closed_loop, next, &mut recalled, |_| ()).unwrap();
+    assert!(report.bit_identical && board.learning().unwrap().recalled);
+    // As if the power had not been cut.
+    let uncut = closed_loop.fly_learning(&next[0], &mut software).unwrap();
+    println!("{report:?}, {:.2} cm of {:.2}, uncut {:.2}", 100.0 * records[0].rms, 100.0 * baseline[2], 100.0 * uncut.rms);
+    assert!(records[0].rms < 1.2 * uncut.rms, "{} m, of {}", records[0].rms, uncut.rms);
+
+    // Beside a model it is another loop, and nothing is gone on with. It is measured without the model's lanes.
+    let file = model::file(&model::TANH, Precision::Int8);
+    let model = Model::from_bytes(&file).unwrap();
+    drop((emulated, board));
+    let (_emulated, mut board) = pil::start_recalling(Some(&file), kept, LinkKind::Lockstep, 3).unwrap();
+    board.introduce().unwrap();
+    let mut beside = pil::learner(&closed_loop).unwrap();
+    assert_eq!(board.learned().unwrap(), beside.keep(Some(model.checksum()), &mut [0; KEPT]).unwrap());
+    beside.add_on().commission();
+    board.learn(LearnOrder::Commission).unwrap();
+    let [hover, stroke] = [&hover[0], &next[0]].map(|plan| plan.clone().with(&model, Lanes::BOTH));
+    let (_, report) = pil::fly_learning(&mut board, &closed_loop, &[hover], &mut beside, |_| ()).unwrap();
+    assert!(report.bit_identical && board.learning().unwrap().phase == Phase::Learning);
+    for axis in 0..3 {
+        assert_eq!(beside.add_on().response(axis), software.add_on().response(axis));
+    }
+    let (_, report) = pil::fly_learning(&mut board, &closed_loop, &[stroke], &mut beside, |_| ()).unwrap();
+    let telemetry = board.telemetry();
+    assert!(report.bit_identical && telemetry.network.weight == 1.0 && telemetry.feedback.weight > 0.0, "{telemetry:?}");
 }
 
 /// Exchanges until the vehicle has taken off.

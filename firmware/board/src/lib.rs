@@ -6,7 +6,7 @@
 //! | layer | modules | what they hold |
 //! |--:|---|---|
 //! | 1 | `vehicle` | the vehicle, its rates, its link |
-//! | 1 | `slots` | where the models lie in the flash |
+//! | 1 | `slots` | where models and what was learned lie in the flash |
 //! | 2 | `motor` | rotor speeds to duty cycles |
 //! | 2 | `start` | the newest model that the vehicle can fly, and the loop before it is sent another |
 //! | 3 | `tasks` | control, receiver, inference, storage: what each does when it runs |
@@ -19,5 +19,5 @@ mod tasks;
 mod vehicle;
 
 pub use start::{Start, fits, start};
-pub use tasks::{Cost, Tasks, Tick};
+pub use tasks::{Cost, Keeping, Tasks, Tick};
 pub use vehicle::{CONTROL_HZ, CORE_HZ, CRAZYFLIE, LINK_BAUD};

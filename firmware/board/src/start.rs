@@ -3,17 +3,17 @@
 use impromptu_firmware::{
     model::{Model, Refusal},
     network::{Network, Scratch},
-    storage::{Sequence, SlotIndex, Survey, survey},
+    storage::{Sequence, SlotIndex, Survey, newest, survey},
 };
-use impromptu_flight::{application::Application, flight::Flight};
+use impromptu_flight::{application::Application, autopilot::Learns, flight::Flight, learning::KEPT};
 use static_cell::{ConstStaticCell, StaticCell};
 
 use crate::vehicle::CRAZYFLIE;
 
 /// A board that is ready.
-pub struct Start {
+pub struct Start<L: 'static> {
     /// For the control task.
-    pub application: &'static mut Application<'static>,
+    pub application: &'static mut Application<'static, L>,
     /// For the inference task.
     pub network: Option<&'static Network<'static>>,
     /// The slot for the next upload.
@@ -24,12 +24,16 @@ pub struct Start {
     pub scratch: &'static mut Scratch,
 }
 
-/// Looks at the slots and sets the application up; once, since it lies in a static. `None`: the airframe cannot be mixed.
+/// Looks at the slots and sets the application up; once, since what it needs lies in statics. One that learns goes on with the
+/// newest in the slot `learned` that was kept of this vehicle and the model that flies. `None`: the airframe cannot be mixed.
 #[inline(never)]
-pub fn start(slots: [&'static [u8]; 2]) -> Option<Start> {
-    static APPLICATION: ConstStaticCell<Application<'static>> = ConstStaticCell::new(Application::new());
+pub fn start<L: Learns>(
+    application: &'static mut Application<'static, L>,
+    slots: [&'static [u8]; 2],
+    learned: &[u8],
+) -> Option<Start<L>> {
     static SCRATCH: ConstStaticCell<Scratch> = ConstStaticCell::new(Scratch::new());
-    let (application, scratch) = (APPLICATION.take(), SCRATCH.take());
+    let scratch = SCRATCH.take();
     let autopilot = application.autopilot();
     autopilot.configure(&CRAZYFLIE).ok()?;
     let Survey { flies, spare, sequence } = survey(slots, scratch, fits);
@@ -38,6 +42,7 @@ pub fn start(slots: [&'static [u8]; 2]) -> Option<Start> {
         // It was checked to fit.
         let _ = autopilot.load(model, Some(u8::from(spare == SlotIndex::First)));
     }
+    newest::<KEPT>(learned, |kept| autopilot.recall(kept).is_ok());
     Some(Start { application, network: model.and_then(Model::network), spare, sequence, scratch })
 }
 

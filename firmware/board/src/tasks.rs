@@ -13,11 +13,13 @@ use impromptu_firmware::{
     exchange::Mailbox,
     model::{MAX_FEATURES, MAX_OUTPUTS},
     network::{Network, Scratch},
-    storage::{Slot, Uploader},
+    storage::{Arming, Journal, Slot, Uploader},
 };
 use impromptu_flight::{
     application::{Application, Upload, WORDS, outcome_from_words, outcome_words},
-    autopilot::Meters,
+    autopilot::{Learns, Meters},
+    learning::KEPT,
+    link::{Outcome, Reason},
     types::MotorCommand,
 };
 
@@ -58,6 +60,35 @@ pub struct Tasks {
     stack: AtomicU32,
 }
 
+/// What was learned, on its way from the control task to the storage task: of a board whose vehicle has a learner, in a static.
+#[derive(Debug)]
+pub struct Keeping(Mailbox<KEPT_WORDS>);
+
+impl Keeping {
+    /// Nothing to keep.
+    pub const fn new() -> Self {
+        Self(Mailbox::new())
+    }
+
+    // Apart from the flight, as `on_bytes`.
+    #[inline(never)]
+    fn put(&self, application: &mut Application<'_, impl Learns>) -> bool {
+        let mut bytes = [0; KEPT];
+        let Some(sequence) = application.take_learned(&mut bytes) else { return false };
+        self.0.put_from(sequence.into(), bytes.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes)));
+        true
+    }
+}
+
+impl Default for Keeping {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+const KEPT_WORDS: usize = KEPT / 4;
+const _: () = assert!(KEPT.is_multiple_of(4));
+
 /// What a tick of the control task leaves to do.
 #[derive(Clone, Copy, Debug)]
 pub struct Tick {
@@ -86,7 +117,7 @@ impl Tasks {
     /// Control: takes bytes of the link; whether the storage has a piece to store.
     // Apart from the flight, which needs none of its stack.
     #[inline(never)]
-    pub fn on_bytes(&self, application: &mut Application<'_>, bytes: &[u8]) -> bool {
+    pub fn on_bytes(&self, application: &mut Application<'_, impl Learns>, bytes: &[u8]) -> bool {
         let mut piece = false;
         for byte in bytes {
             if let Some(upload) = application.on_byte(*byte) {
@@ -105,7 +136,13 @@ impl Tasks {
 
     /// Control: flies a tick; `received` is what taking its bytes cost.
     #[inline(never)]
-    pub fn fly(&self, application: &mut Application<'_>, meters: &mut Meters, counter: &impl Cost, received: u32) -> Tick {
+    pub fn fly(
+        &self,
+        application: &mut Application<'_, impl Learns>,
+        meters: &mut Meters,
+        counter: &impl Cost,
+        received: u32,
+    ) -> Tick {
         // With the first tick of a flight comes its trajectory.
         let flying = application.autopilot().in_flight();
         let mut job = Job::EMPTY;
@@ -113,11 +150,7 @@ impl Tasks {
             if let Some((tick, outputs)) = self.inferences.take_floats() {
                 application.deliver(Inference { tick: tick as i32, outputs });
             }
-            if let Some((sequence, words)) = self.outcomes.take()
-                && let Some(outcome) = outcome_from_words(words)
-            {
-                application.acknowledge(sequence as u8, outcome);
-            }
+            self.acknowledge(application);
             let (command, released) = application.step(meters, &mut job);
             if released {
                 self.jobs.put_floats(job.tick as u32, &job.inputs);
@@ -132,6 +165,16 @@ impl Tasks {
         meters.stack_bytes = self.stack.load(Ordering::Relaxed);
         self.control_total.fetch_add(cost, Ordering::Relaxed);
         Tick { command, job: released, cost }
+    }
+
+    /// Control: tells what became of a piece. Apart from the flight, as [`Tasks::on_bytes`].
+    #[inline(never)]
+    fn acknowledge(&self, application: &mut Application<'_, impl Learns>) {
+        if let Some((sequence, words)) = self.outcomes.take()
+            && let Some(outcome) = outcome_from_words(words)
+        {
+            application.acknowledge(sequence as u8, outcome);
+        }
     }
 
     /// Inference: does the job that waits.
@@ -156,6 +199,24 @@ impl Tasks {
         let Some(upload) = &piece else { return };
         let outcome = upload.carry_out(uploader, scratch, fits);
         self.outcomes.put(upload.sequence.into(), &outcome_words(&outcome));
+    }
+
+    /// Control: hands over what was learned, if it is to be kept: `true`.
+    pub fn keep(&self, application: &mut Application<'_, impl Learns>, keeping: &Keeping) -> bool {
+        application.keeps_learned() && keeping.put(application)
+    }
+
+    /// Storage: keeps what was learned, if it waits.
+    #[inline(never)]
+    pub fn store_learned<S: Slot>(&self, journal: &mut Journal<S, KEPT>, keeping: &Keeping) {
+        let mut words = [0; KEPT_WORDS];
+        let Some(sequence) = keeping.0.take_into(&mut words) else { return };
+        let bytes = words.iter().flat_map(|word| word.to_le_bytes());
+        let outcome = match journal.append(Arming::Disarmed, bytes) {
+            Ok(()) => Outcome::Done,
+            Err(_) => Outcome::Refused(Reason::Storage),
+        };
+        self.outcomes.put(sequence, &outcome_words(&outcome));
     }
 
     /// Apart, so that it is on the stack once.

@@ -67,6 +67,9 @@
 #define IMPROMPTU_FLIGHT_WORDS 2096
 #endif
 
+// Words of 8 bytes of an impromptu_learner.
+#define IMPROMPTU_LEARNER_WORDS 480
+
 // Words of 8 bytes of an impromptu_scratch.
 #define IMPROMPTU_SCRATCH_WORDS 257
 
@@ -81,6 +84,9 @@
 
 // Reasons for which the guard trips a lane.
 #define IMPROMPTU_TRIPS 8
+
+// Most bytes of what a learner keeps.
+#define IMPROMPTU_KEPT 848
 
 // Samples of the desired trajectory that an adapter or a flight stack keeps, past ones included.
 #define IMPROMPTU_PREVIEW 192
@@ -150,12 +156,57 @@ enum impromptu_status
   IMPROMPTU_STATUS_BRAKING = 33,
   // The reference tick has been flown, or lies further ahead than the preview keeps.
   IMPROMPTU_STATUS_TICK = 34,
+  // The response of the axis is neither given nor measured: commission first, or give one.
+  IMPROMPTU_STATUS_UNKNOWN = 35,
+  // Nothing was kept there, or it is damaged, or the memory is too small to keep it: learn, then keep.
+  IMPROMPTU_STATUS_NOT_KEPT = 36,
+  // What was kept is of another loop, rate or identity: learn anew, then keep.
+  IMPROMPTU_STATUS_OTHER = 37,
+  // The axis is being commissioned: wait until it has ended, or stop it.
+  IMPROMPTU_STATUS_BUSY = 38,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
 typedef enum impromptu_status impromptu_status;
 #else
 typedef int32_t impromptu_status;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// Why an axis was not commissioned.
+enum impromptu_learner_problem
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  // Nothing went wrong.
+  IMPROMPTU_LEARNER_PROBLEM_NONE = 0,
+  // The response is neither given nor measured.
+  IMPROMPTU_LEARNER_PROBLEM_UNKNOWN = 1,
+  // The loop did not move the machine.
+  IMPROMPTU_LEARNER_PROBLEM_GROUNDED = 2,
+  // The trajectory did not rest.
+  IMPROMPTU_LEARNER_PROBLEM_MOVING = 3,
+  // Ticks were left out.
+  IMPROMPTU_LEARNER_PROBLEM_GAP = 4,
+  // A fifth of the samples was missing.
+  IMPROMPTU_LEARNER_PROBLEM_MISSING = 5,
+  // There was other motion than that of the steps.
+  IMPROMPTU_LEARNER_PROBLEM_NOISY = 6,
+  // The loop does not follow its reference.
+  IMPROMPTU_LEARNER_PROBLEM_GAIN = 7,
+  // The loop moves against its reference.
+  IMPROMPTU_LEARNER_PROBLEM_OPPOSITE = 8,
+  // The loop is too slow or too fast.
+  IMPROMPTU_LEARNER_PROBLEM_SPEED = 9,
+  // For a reason that this version cannot name.
+  IMPROMPTU_LEARNER_PROBLEM_OTHER = 10,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum impromptu_learner_problem impromptu_learner_problem;
+#else
+typedef uint32_t impromptu_learner_problem;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -360,6 +411,70 @@ typedef struct impromptu_command {
   struct impromptu_reference reference;
 } impromptu_command;
 
+// Memory for what learns an axis, and the trajectory ahead of it.
+typedef struct impromptu_learner {
+  // Not for the caller.
+  uint64_t words[IMPROMPTU_LEARNER_WORDS];
+} impromptu_learner;
+
+// Settings of what learns an axis. Values and their rates are in the unit of the axis, and a second.
+typedef struct impromptu_learner_settings {
+  // Rate of the references, Hz.
+  float rate_hz;
+  // Age of a measured value when it arrives, s.
+  float age_s;
+  // Number of the axis, so that several can be commissioned at once.
+  uint32_t axis;
+  // How the measured value answers a change of the reference, if it is known: gain at rest. 0: it is to be commissioned.
+  float gain;
+  // Natural frequency of the response, rad/s.
+  float frequency;
+  // Damping ratio of the response.
+  float damping;
+  // Delay of the response, s, the age of a measured value included.
+  float delay_s;
+  // About what a correction is at its largest in a calm motion: errors are judged by it.
+  float scale;
+  // Largest correction.
+  float correction;
+  // What of it may follow from the error.
+  float feedback;
+  // Largest change of the correction in a second.
+  float rate;
+  // By how much the reference steps to either side while the axis is commissioned; at most `correction`.
+  float probe_size;
+  // For how long, s: about three times the time in which the loop settles; at least 400 ticks.
+  float probe_s;
+  // What tells this loop from others, and the model before it, if there is one: what was kept of another is refused.
+  uint32_t identity;
+} impromptu_learner_settings;
+
+// How far what learns an axis is.
+typedef struct impromptu_progress {
+  // 0 off, 1 commissioning, 2 learning, 3 holding.
+  uint32_t phase;
+  // An impromptu_learner_problem: what went wrong last in commissioning.
+  uint32_t problem;
+  // Share of commissioning that is done, 0..1.
+  float commissioned;
+  // Seconds in motion that were learned from.
+  float learned_s;
+  // Share of the correction that acts, 0..1.
+  float share;
+  // How often what was learned was forgotten because it did harm.
+  uint32_t forgotten;
+  // The correction of the last tick.
+  float correction;
+  // The response that it goes by: gain at rest, 0 if none is known.
+  float gain;
+  // Natural frequency, rad/s.
+  float frequency;
+  // How late a slow correction is answered, s.
+  float lag_s;
+  // Samples of the trajectory ahead of the last tick; negative if it has ended.
+  int32_t reach;
+} impromptu_progress;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -446,6 +561,10 @@ impromptu_status impromptu_adapter_expect_noise(struct impromptu_adapter *adapte
 // States whether the loop moves the machine (not 0): a vehicle on the ground, or a machine that is held, does not follow. Until
 // it does, no lane acts, nothing is integrated, learned or judged; then the lanes fade in. It does from the start on.
 impromptu_status impromptu_adapter_set_airborne(struct impromptu_adapter *adapter, int airborne);
+
+// Writes what the feedback lane corrected of each reference channel in the last tick, as many numbers as the loop has reference
+// channels, for what learns beside it (impromptu_learner_tell_other).
+impromptu_status impromptu_adapter_fed_back(struct impromptu_adapter *adapter, float *fed_back, size_t count);
 
 // Switches the network lane and the feedback lane on (not 0) or off; they fade in and out over the model's fade time. With both
 // off and faded out the reference is the desired one, to the bit.
@@ -562,6 +681,71 @@ impromptu_status impromptu_flight_report(struct impromptu_flight *flight, struct
 
 // Bytes of a flight stack as the library was compiled: at most sizeof(impromptu_flight).
 size_t impromptu_flight_size(void);
+
+// Creates in `learner`, which has `size` bytes, what learns the corrections of one axis while its loop runs: no model is needed.
+// It is off: impromptu_learner_commission or impromptu_learner_learn start it. An axis more is an object more. The first sample
+// pushed will be that of reference tick `first_tick`. Needs up to 8 KB of stack.
+impromptu_status impromptu_learner_create(struct impromptu_learner *learner,
+                                          size_t size,
+                                          const struct impromptu_learner_settings *settings,
+                                          int32_t first_tick);
+
+// Appends what is desired at the next reference tick. Push 80 ticks ahead; what is missing is taken as the trajectory's end. At
+// most 128 samples are kept.
+impromptu_status impromptu_learner_push(struct impromptu_learner *learner, float desired);
+
+// Forgets the trajectory, for another one: the next sample pushed will be that of reference tick `first_tick`. What was learned
+// stays.
+impromptu_status impromptu_learner_restart(struct impromptu_learner *learner, int32_t first_tick);
+
+// States, before a step, what another feedback corrected of this axis in the last tick, as a model's feedback lane
+// (impromptu_adapter_fed_back): what that resists is not still missing. Measure the response without it.
+impromptu_status impromptu_learner_tell_other(struct impromptu_learner *learner, float correction);
+
+// Measures the response: as soon as the trajectory rests, the reference steps to and fro by the stated size; then it learns,
+// from nothing. impromptu_learner_report tells how far it is, and why it was given up.
+impromptu_status impromptu_learner_commission(struct impromptu_learner *learner);
+
+// Learns and corrects. IMPROMPTU_STATUS_UNKNOWN: no response is known.
+impromptu_status impromptu_learner_learn(struct impromptu_learner *learner);
+
+// Corrects by what it has learned, and learns no more. IMPROMPTU_STATUS_UNKNOWN: no response is known.
+impromptu_status impromptu_learner_hold(struct impromptu_learner *learner);
+
+// Neither learns nor corrects: the correction goes back to nothing by its rate. What was learned stays.
+impromptu_status impromptu_learner_stop(struct impromptu_learner *learner);
+
+// Forgets what was learned, not how the loop answers.
+impromptu_status impromptu_learner_forget(struct impromptu_learner *learner);
+
+// A reference tick: writes the correction, which the caller adds to what is desired. `measured` is the value of the axis, `rate`
+// its rate of change; NaN stands for a sample that is missing and for a rate that is not measured. `moving` (not 0) says that
+// the loop moves the machine: else nothing is learned and nothing corrected.
+//
+// It is written, and the tick is done, also after IMPROMPTU_STATUS_BAD_SAMPLE (the value was missing) and
+// IMPROMPTU_STATUS_NO_TRAJECTORY (nothing was pushed: no correction).
+//
+// Needs up to 8 KB of stack where commissioning begins and ends, else 2 KB.
+impromptu_status impromptu_learner_step(struct impromptu_learner *learner,
+                                        int32_t tick,
+                                        float measured,
+                                        float rate,
+                                        int moving,
+                                        float *correction);
+
+// How far it is.
+impromptu_status impromptu_learner_report(const struct impromptu_learner *learner, struct impromptu_progress *result);
+
+// Writes what was learned to `bytes`, which has room for `size` of them, and their number to `length`: to be stored, and given
+// to impromptu_learner_recall after a power cut. IMPROMPTU_KEPT bytes are enough. Needs up to 4 KB of stack.
+impromptu_status impromptu_learner_keep(const struct impromptu_learner *learner, uint8_t *bytes, size_t size, size_t *length);
+
+// Goes on with what was kept, `size` bytes or more at `bytes`: in the phase in which it is. IMPROMPTU_STATUS_OTHER: it is of
+// another loop. Needs up to 8 KB of stack.
+impromptu_status impromptu_learner_recall(struct impromptu_learner *learner, const uint8_t *bytes, size_t size);
+
+// Bytes of a learner as the library was compiled: at most sizeof(impromptu_learner).
+size_t impromptu_learner_size(void);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -11,6 +11,7 @@
 //! | 2 | `values` | plain numbers that cross the border |
 //! | 3 | `adapter` | the add-on with as many channels as a table has at run time |
 //! | 3 | `flight` | the flight stack |
+//! | 3 | `learner` | what learns an axis |
 //! | 4 | `memory` | memory that the caller owns, and whether it holds an object |
 //! | 5 | `edge` | the functions that C calls |
 #![cfg_attr(target_os = "none", no_std)]
@@ -18,6 +19,7 @@
 pub mod adapter;
 pub mod edge;
 pub mod flight;
+pub mod learner;
 pub mod memory;
 pub mod status;
 pub mod values;

@@ -5,7 +5,7 @@
 
 use impromptu_firmware::{model::Model, network::Scratch};
 
-use crate::{adapter::Stage, flight::Stack};
+use crate::{adapter::Stage, flight::Stack, learner::Learning};
 
 /// Words of 8 bytes of an impromptu_model.
 #[cfg(target_pointer_width = "64")]
@@ -25,6 +25,8 @@ pub const FLIGHT_WORDS: usize = 2096;
 /// Words of 8 bytes of an impromptu_flight.
 #[cfg(target_pointer_width = "32")]
 pub const FLIGHT_WORDS: usize = 2096;
+/// Words of 8 bytes of an impromptu_learner.
+pub const LEARNER_WORDS: usize = 480;
 /// Words of 8 bytes of an impromptu_scratch.
 pub const SCRATCH_WORDS: usize = 257;
 
@@ -50,6 +52,14 @@ pub struct AdapterMemory {
 pub struct FlightMemory {
     /// Not for the caller.
     pub words: [u64; FLIGHT_WORDS],
+}
+
+/// Memory for what learns an axis, and the trajectory ahead of it.
+#[repr(C)]
+#[derive(Debug)]
+pub struct LearnerMemory {
+    /// Not for the caller.
+    pub words: [u64; LEARNER_WORDS],
 }
 
 /// Working memory for one evaluation of a network at a time.
@@ -94,6 +104,11 @@ impl Stored for Stage {
 impl Stored for Stack {
     type Memory = FlightMemory;
     const MARK: u32 = 0x5947_4c46;
+}
+
+impl Stored for Learning {
+    type Memory = LearnerMemory;
+    const MARK: u32 = 0x4e52_454c;
 }
 
 impl Stored for Scratch {

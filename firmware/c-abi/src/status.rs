@@ -70,11 +70,19 @@ pub enum Status {
     Braking = 33,
     /// The reference tick has been flown, or lies further ahead than the preview keeps.
     Tick = 34,
+    /// The response of the axis is neither given nor measured: commission first, or give one.
+    Unknown = 35,
+    /// Nothing was kept there, or it is damaged, or the memory is too small to keep it: learn, then keep.
+    NotKept = 36,
+    /// What was kept is of another loop, rate or identity: learn anew, then keep.
+    Other = 37,
+    /// The axis is being commissioned: wait until it has ended, or stop it.
+    Busy = 38,
 }
 
 impl Status {
     /// Every status.
-    pub(crate) const ALL: [Self; 29] = [
+    pub(crate) const ALL: [Self; 33] = [
         Self::Ok,
         Self::Null,
         Self::Misaligned,
@@ -104,6 +112,10 @@ impl Status {
         Self::Full,
         Self::Braking,
         Self::Tick,
+        Self::Unknown,
+        Self::NotKept,
+        Self::Other,
+        Self::Busy,
     ];
 
     /// The status in words, with what to do.
@@ -138,6 +150,10 @@ impl Status {
             Self::Full => c"the preview is full: push no further ahead",
             Self::Braking => c"the vehicle brakes: only a re-plan goes on",
             Self::Tick => c"the reference tick has been flown, or lies too far ahead",
+            Self::Unknown => c"the response of the axis is not known: commission first, or give one",
+            Self::NotKept => c"nothing was kept there, it is damaged, or the memory is too small: learn, then keep",
+            Self::Other => c"what was kept is of another loop, rate or identity: learn anew, then keep",
+            Self::Busy => c"the axis is being commissioned: wait until it has ended, or stop it",
         }
     }
 }

@@ -3,17 +3,22 @@
 //! *in/out* structures of f32, u32 and i32 in a layout that C knows; *never* padding between numbers, a pointer into the library,
 //! or a value that Rust could not hold; *source* [`impromptu_flight::types`], [`impromptu_flight::flight::Settings`].
 
+mod learner;
+
 use core::ffi::c_char;
 
 use impromptu_firmware::{
     adapter, add_on,
     guard::{Trip, Trips},
+    learning::Kept,
     model::{self, Model},
 };
 use impromptu_flight::{
     control::{self, PositionGains},
     flight, types,
 };
+
+pub use learner::{LearnerProblem, LearnerReport, LearnerSettings};
 
 /// Most channels of a signal.
 pub const MAX_CHANNELS: usize = 16;
@@ -23,6 +28,8 @@ pub const MAX_FEATURES: usize = 128;
 pub const MAX_OUTPUTS: usize = 8;
 /// Reasons for which the guard trips a lane.
 pub const TRIPS: usize = 8;
+/// Most bytes of what a learner keeps.
+pub const KEPT: usize = 848;
 /// Samples of the desired trajectory that an adapter or a flight stack keeps, past ones included.
 pub const PREVIEW: usize = 192;
 
@@ -32,6 +39,7 @@ const _: () = assert!(
         && MAX_OUTPUTS == model::MAX_OUTPUTS
         && PREVIEW == flight::PREVIEW
         && TRIPS == Trip::ALL.len()
+        && KEPT == Kept::length(1)
 );
 
 /// One channel of a signal. The texts must live until the adapter is created.

@@ -9,10 +9,11 @@ use heapless::Vec;
 use impromptu_firmware::adapter::{Inference, Job};
 
 use crate::{
-    autopilot::{Autopilot, Meters, Reaction},
+    autopilot::{Autopilot, Learns, Meters, NoLearner, Reaction},
+    learning::KEPT,
     link::{
-        Command, Commands, FRAME, Fault, Message, Order, Outcome, Reason, Received, Receiver, Report, Sender,
-        message::FrameReport,
+        CHUNK, Command, Commands, FRAME, Fault, Message, Order, Outcome, Reason, Received, Receiver, Report, Sender,
+        message::{FrameReport, LearnOrder, LearnedPiece},
     },
     types::MotorCommand,
 };
@@ -22,23 +23,23 @@ pub use upload::{Upload, WORDS, outcome_from_words, outcome_words};
 /// Bytes that can wait to be sent: what a tick sends at most, and some acknowledgements.
 pub const OUTBOX: usize = FRAME + FRAME / 2;
 /// Control ticks from one telemetry report to the next.
-const TELEMETRY_TICKS: u32 = 50;
+const TELEMETRY_TICKS: u8 = 50;
 
 /// Name and version of this firmware.
 pub const SOFTWARE: &str = concat!("impromptu ", env!("CARGO_PKG_VERSION"));
 
 /// An autopilot that talks.
 #[derive(Debug)]
-pub struct Application<'m> {
-    autopilot: Autopilot<'m>,
+pub struct Application<'m, L = NoLearner> {
+    autopilot: Autopilot<'m, L>,
     receiver: Receiver<Commands>,
     tx: TxQueue,
     /// Control ticks since the last telemetry report.
-    telemetry: u32,
+    telemetry: u8,
     storing: Storing,
 }
 
-/// Whether a model is on its way into the flash.
+/// Whether a model, or what was learned, is on its way into the flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Storing {
     /// It is not.
@@ -49,6 +50,8 @@ enum Storing {
     Last,
     /// A new model flies from the next start on.
     Stored,
+    /// What was learned waits for [`Application::take_learned`], with the sequence number of the command to keep it.
+    Learned(u8),
 }
 
 /// Messages to bytes that wait to be sent.
@@ -83,8 +86,18 @@ impl TxQueue {
 }
 
 #[inline(never)]
-fn introduce(tx: &mut TxQueue, autopilot: &Autopilot<'_>) {
+fn introduce(tx: &mut TxQueue, autopilot: &Autopilot<'_, impl Learns>) {
     tx.send(&Report::Identity(autopilot.identity(SOFTWARE)));
+}
+
+// As `introduce`.
+#[inline(never)]
+fn tell_learned(tx: &mut TxQueue, autopilot: &Autopilot<'_, impl Learns>, offset: u32) {
+    let mut bytes = [0; KEPT];
+    let Some(learned) = autopilot.keep(&mut bytes) else { return };
+    let rest = learned.get(offset as usize..).unwrap_or_default();
+    let bytes = rest.get(..CHUNK).unwrap_or(rest);
+    tx.send(&Report::Learned(LearnedPiece { length: learned.len() as u32, offset, bytes }));
 }
 
 impl Default for Application<'_> {
@@ -93,15 +106,27 @@ impl Default for Application<'_> {
     }
 }
 
-impl<'m> Application<'m> {
+impl Application<'_> {
     /// An application that has received and sent nothing.
     pub const fn new() -> Self {
-        let tx = TxQueue { sender: Sender::new(), outbox: Vec::new() };
-        Self { autopilot: Autopilot::new(), receiver: Receiver::new(), tx, telemetry: 0, storing: Storing::No }
+        Self::with(NoLearner)
+    }
+}
+
+impl<'m, L: Learns> Application<'m, L> {
+    /// [`Application::new`] whose vehicle learns with this.
+    pub const fn with(learner: L) -> Self {
+        Self {
+            autopilot: Autopilot::with(learner),
+            receiver: Receiver::new(),
+            tx: TxQueue { sender: Sender::new(), outbox: Vec::new() },
+            telemetry: 0,
+            storing: Storing::No,
+        }
     }
 
     /// The vehicle.
-    pub fn autopilot(&mut self) -> &mut Autopilot<'m> {
+    pub fn autopilot(&mut self) -> &mut Autopilot<'m, L> {
         &mut self.autopilot
     }
 
@@ -111,7 +136,7 @@ impl<'m> Application<'m> {
         let Self { autopilot, receiver, tx, storing, .. } = self;
         let (sequence, outcome) = match receiver.push(byte)? {
             Ok(Received { sequence, order, message }) => {
-                let in_work = matches!(storing, Storing::Piece | Storing::Last);
+                let in_work = !matches!(storing, Storing::No | Storing::Stored);
                 if Upload::is_made_of(&message) && order != Order::Late {
                     let reason = if autopilot.armed() {
                         Reason::Armed
@@ -125,6 +150,15 @@ impl<'m> Application<'m> {
                         return Upload::new(sequence, &message);
                     };
                     (sequence, Outcome::Refused(reason))
+                } else if matches!(message, Command::Learn(LearnOrder::Keep)) && order != Order::Late {
+                    match autopilot.keeps() {
+                        Ok(()) if *storing != Storing::No => (sequence, Outcome::Refused(Reason::Busy)),
+                        Ok(()) => {
+                            *storing = Storing::Learned(sequence);
+                            return None;
+                        }
+                        Err(reason) => (sequence, Outcome::Refused(reason)),
+                    }
                 } else if *storing != Storing::No && matches!(message, Command::Arm) && order != Order::Late {
                     // The core stands still while the flash is erased.
                     (sequence, Outcome::Refused(Reason::Busy))
@@ -133,6 +167,10 @@ impl<'m> Application<'m> {
                         Reaction::Silence => return None,
                         Reaction::Introduce => {
                             introduce(tx, autopilot);
+                            return None;
+                        }
+                        Reaction::TellLearned(offset) => {
+                            tell_learned(tx, autopilot, offset);
                             return None;
                         }
                         Reaction::Acknowledge(outcome) => (sequence, outcome),
@@ -146,6 +184,19 @@ impl<'m> Application<'m> {
         None
     }
 
+    /// Writes what was learned, if there is a command to keep it, and gives its sequence number, once: for a task that may wait
+    /// for the flash, and whose outcome is for [`Application::acknowledge`]. A board whose vehicle learns asks in every control
+    /// tick.
+    pub fn take_learned(&mut self, bytes: &mut [u8; KEPT]) -> Option<u8> {
+        let Storing::Learned(sequence) = self.storing else { return None };
+        self.storing = Storing::Piece;
+        if self.autopilot.keep(bytes).is_none() {
+            self.acknowledge(sequence, Outcome::Refused(Reason::NoLearner));
+            return None;
+        }
+        Some(sequence)
+    }
+
     /// Tells the sender what became of a command that a task of lower priority carried out.
     pub fn acknowledge(&mut self, sequence: u8, outcome: Outcome) {
         self.storing = match (self.storing, outcome) {
@@ -157,7 +208,12 @@ impl<'m> Application<'m> {
 
     /// Whether a task of lower priority has a piece of a model in work, so that the core may stand still for seconds.
     pub fn storing(&self) -> bool {
-        matches!(self.storing, Storing::Piece | Storing::Last)
+        !matches!(self.storing, Storing::No | Storing::Stored)
+    }
+
+    /// Whether what was learned waits for [`Application::take_learned`].
+    pub fn keeps_learned(&self) -> bool {
+        matches!(self.storing, Storing::Learned(_))
     }
 
     /// Whether a new model waits to be flown from the next start on. Until then the vehicle is not armed.
@@ -195,6 +251,9 @@ impl<'m> Application<'m> {
             let frames = self.frames();
             self.tx.send(&Report::Telemetry(self.autopilot.telemetry(meters, frames)));
             self.tx.send(&Report::Inputs(self.autopilot.inputs()));
+            if let Some(learning) = self.autopilot.learning() {
+                self.tx.send(&Report::Learning(learning));
+            }
         }
     }
 

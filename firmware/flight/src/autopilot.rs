@@ -17,13 +17,13 @@
 //! | a setpoint that was flown without, or of a sender that starts again | refused, with the tick that is expected |
 //! | no setpoint any more | the end of the trajectory is held |
 
+mod learner;
 mod meters;
+mod reports;
 mod state_age;
 
 use impromptu_firmware::{
     adapter::{Inference, Job, Lanes},
-    guard::Trip,
-    math::{finite_or_zero, sqrt},
     model::{Model, Refusal},
 };
 use nalgebra::{Quaternion, UnitQuaternion, Vector4};
@@ -31,15 +31,13 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector4};
 use crate::{
     course::{Course, Now},
     flight::Flight,
-    link::{
-        Command, Message, Order, Outcome, Reason, Received,
-        message::{FrameReport, Identity, InputReport, LaneReport, Motors, Telemetry},
-    },
+    link::{Command, Message, Order, Outcome, Reason, Received},
     motion::MotionLimits,
     settings::{Rates, Setting, Settings},
     types::{MotorCommand, Reference, State, Tick},
 };
 
+pub use learner::{FlightLearner, Learns, NoLearner};
 pub use meters::Meters;
 use state_age::{News, StateAge};
 pub use state_age::{RUN, Timeouts};
@@ -53,11 +51,13 @@ pub enum Reaction {
     Introduce,
     /// The sender is told what became of the command.
     Acknowledge(Outcome),
+    /// The sender is told what was learned, from this byte of it on.
+    TellLearned(u32),
 }
 
 /// The flight stack with arming, and with timeouts for a link that fails.
 #[derive(Debug)]
-pub struct Autopilot<'m> {
+pub struct Autopilot<'m, L = NoLearner> {
     flight: Flight<'m>,
     rates: Option<Rates>,
     model: Option<&'m Model<'m>>,
@@ -72,6 +72,7 @@ pub struct Autopilot<'m> {
     /// Mean square of the tracking error over about the last second, m².
     error_square: f32,
     refused: u32,
+    learner: L,
 }
 
 impl Default for Autopilot<'_> {
@@ -80,9 +81,16 @@ impl Default for Autopilot<'_> {
     }
 }
 
-impl<'m> Autopilot<'m> {
+impl Autopilot<'_> {
     /// A vehicle that knows nothing of itself: it cannot be armed. 13 KB, so a microcontroller has it in a static.
     pub const fn new() -> Self {
+        Self::with(NoLearner)
+    }
+}
+
+impl<'m, L: Learns> Autopilot<'m, L> {
+    /// [`Autopilot::new`] that learns with this.
+    pub const fn with(learner: L) -> Self {
         Self {
             flight: Flight::empty(),
             rates: None,
@@ -99,6 +107,7 @@ impl<'m> Autopilot<'m> {
             course: Course::NONE,
             error_square: 0.0,
             refused: 0,
+            learner,
         }
     }
 
@@ -134,6 +143,7 @@ impl<'m> Autopilot<'m> {
         }
         self.course.reset();
         (self.rates, self.age, self.state) = (Some(settings.rates), StateAge::new(&settings.rates), State::ORIGIN);
+        self.learner.configure(settings);
         match self.model {
             Some(model) if self.flight.adapter().is_none() => {
                 self.flight.attach(model, Lanes::NONE).map_err(|refusal| Reason::Model((&refusal).into()))
@@ -194,7 +204,10 @@ impl<'m> Autopilot<'m> {
             }
             (Command::Position(position), _) => {
                 match self.age.position(position.tick) {
-                    News::Newer => position.apply(&mut self.state),
+                    News::Newer => {
+                        position.apply(&mut self.state);
+                        self.learner.hear();
+                    }
                     News::Older => {}
                     News::Ahead => self.refuse(),
                 }
@@ -221,6 +234,11 @@ impl<'m> Autopilot<'m> {
                 self.disarm();
                 Ok(())
             }
+            (Command::Learn(order), _) => self.learner.order(*order),
+            (Command::Learned { offset }, _) => match self.tells_learned(*offset) {
+                Ok(()) => return Reaction::TellLearned(*offset),
+                Err(reason) => Err(reason),
+            },
             (Command::ModelBegin { .. } | Command::ModelChunk(_) | Command::ModelCommit, _) => Err(Reason::Storage),
         };
         Reaction::Acknowledge(match outcome {
@@ -230,7 +248,7 @@ impl<'m> Autopilot<'m> {
     }
 
     /// States that were refused since the start: from the future, or such that no vehicle is in. What the line refuses before it
-    /// comes here is in [`FrameReport::damaged`].
+    /// comes here is in [`crate::link::message::FrameReport::damaged`].
     pub fn refused(&self) -> u32 {
         self.refused
     }
@@ -259,6 +277,7 @@ impl<'m> Autopilot<'m> {
             let now = self.now();
             self.course.keep_up(&mut self.flight, &now);
         }
+        self.learner.step(&mut self.flight, self.tick, &self.state);
         let (command, released) = self.flight.control_known(self.tick, &self.state, job);
         self.tick.0 = self.tick.0.wrapping_add(1);
         self.watch();
@@ -273,61 +292,6 @@ impl<'m> Autopilot<'m> {
     /// The reference that the loop tracks now.
     pub fn reference(&self) -> &Reference {
         self.flight.reference()
-    }
-
-    /// What the motors got in the last tick, as the link says it.
-    pub fn motors(&self, command: &MotorCommand) -> Motors {
-        Motors::new(Tick(self.tick.0.wrapping_sub(1)), command, self.flight.reference())
-    }
-
-    /// Who this is.
-    pub fn identity<'a>(&'a self, software: &'a str) -> Identity<'a> {
-        let slot = self.slot;
-        let model = self.model.map(|model| crate::link::message::FlyingModel {
-            name: model.card().name,
-            checksum: model.checksum(),
-            slot,
-        });
-        Identity::new(software, model)
-    }
-
-    /// What became of what it was told.
-    pub fn inputs(&self) -> InputReport {
-        let Now { tick, .. } = self.now();
-        let reach = self.flight.next_setpoint().wrapping_sub(tick).wrapping_sub(1);
-        InputReport { tick: self.tick.0, refused: self.refused, reach, braking: self.course.braking() }
-    }
-
-    /// How the vehicle is.
-    pub fn telemetry(&mut self, meters: &Meters, frames: FrameReport) -> Telemetry {
-        let (network, feedback, late_inferences, saturations) = match self.flight.adapter() {
-            Some(adapter) => {
-                let [network, feedback] = adapter.weights();
-                let lane = |weight, counts: [u16; Trip::ALL.len()]| {
-                    let mut report = LaneReport { weight: finite_or_zero(weight), ..LaneReport::default() };
-                    report.trips.iter_mut().zip(counts).for_each(|(place, count)| *place = count);
-                    report
-                };
-                let trips = adapter.trips();
-                (lane(network, trips.network), lane(feedback, trips.feedback), adapter.late(), adapter.saturations())
-            }
-            None => Default::default(),
-        };
-        Telemetry {
-            tick: self.tick.0,
-            armed: self.armed,
-            network,
-            feedback,
-            late_inferences,
-            saturations,
-            frames,
-            tracking_error: finite_or_zero(sqrt(self.error_square)),
-            control_max: meters.control_max,
-            inference_max: meters.inference_max,
-            stack_bytes: meters.stack_bytes,
-            entry_latency_max: meters.entry_latency_max,
-            deadline_misses: meters.deadline_misses,
-        }
     }
 
     fn switch(&mut self, lanes: Lanes) -> Result<(), Reason> {
@@ -366,6 +330,7 @@ impl<'m> Autopilot<'m> {
         }
         self.flight.reset();
         self.course.reset();
+        self.learner.land();
     }
 
     /// Where the flight is on its trajectory.

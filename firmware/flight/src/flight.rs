@@ -5,6 +5,7 @@
 
 mod clock;
 mod frozen;
+mod loops;
 
 use core::num::NonZeroU32;
 
@@ -18,47 +19,29 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::{
     caps,
-    control::{AttitudeLoop, Mixer, PositionLoop, ThrustVector},
+    control::ThrustVector,
     quadrotor::{self, DESIRED, MEASURED, REFERENCE},
     types::{MotorCommand, POSITION_LIMIT, Reference, Setpoint, State, Tick, within},
 };
 
 pub use crate::settings::{Rates, Settings};
 use clock::Clock;
-use frozen::Frozen;
+pub(crate) use frozen::Frozen;
+use loops::Loops;
 
 /// Samples of the desired trajectory that the flight stack keeps: 1.92 s at 100 Hz.
 pub const PREVIEW: usize = 192;
+
+/// On the ground, by the application's word.
+const GROUNDED: u8 = 1;
+/// By the word of what measures the loop.
+const SUSPENDED: u8 = 2;
 
 /// The adapter of the flight stack.
 pub type QuadrotorAdapter<'m> = Adapter<'m, DESIRED, MEASURED, REFERENCE>;
 
 /// The add-on of the flight stack.
 pub type QuadrotorAddOn<'m> = AddOn<'m, DESIRED, MEASURED, REFERENCE, PREVIEW>;
-
-/// The loops of a vehicle.
-#[derive(Debug)]
-struct Loops {
-    rates: Rates,
-    position_divisor: NonZeroU32,
-    position: PositionLoop,
-    attitude: AttitudeLoop,
-    mixer: Mixer,
-}
-
-impl Loops {
-    /// `None` if no vehicle has these settings.
-    fn new(settings: &Settings) -> Option<Self> {
-        settings.check().ok()?;
-        Some(Self {
-            rates: settings.rates,
-            position_divisor: NonZeroU32::new(settings.rates.position_divisor).unwrap_or(NonZeroU32::MIN),
-            position: PositionLoop::new(settings.position, settings.airframe.mass, settings.rates.reference_hz()),
-            attitude: AttitudeLoop::new(settings.attitude, settings.airframe.inertia),
-            mixer: Mixer::new(&settings.airframe)?,
-        })
-    }
-}
 
 /// What is configured and attached: with an add-on exactly if that has a model, which then fits these loops. Not an `enum` of
 /// three: to go from one to another would be to copy the loops by way of the stack.
@@ -82,8 +65,8 @@ pub struct Flight<'m> {
     /// The newest state that a vehicle can be in.
     state: Option<State>,
     frozen: Frozen,
-    /// It stands on the ground, by the application's word.
-    grounded: bool,
+    /// Why no lane acts: [`GROUNDED`], [`SUSPENDED`]. One byte, since a board has none to spare.
+    still: u8,
 }
 
 impl<'m> Flight<'m> {
@@ -102,7 +85,7 @@ impl<'m> Flight<'m> {
             clock: Clock::EMPTY,
             state: None,
             frozen: Frozen::EMPTY,
-            grounded: false,
+            still: 0,
         }
     }
 
@@ -239,13 +222,24 @@ impl<'m> Flight<'m> {
     /// States whether the vehicle is in the air, which a loop that is closed on the ground cannot know: until it is, no lane
     /// acts, and nothing is integrated or learned, in the position loop too. It is from the start on.
     pub fn set_airborne(&mut self, airborne: bool) {
-        self.grounded = !airborne;
-        self.add_on.parts().0.set_airborne(airborne);
+        self.keep_still(GROUNDED, !airborne);
+    }
+
+    /// Whether no lane acts for the time being, nor learns or judges anything, as on the ground; the loops fly on.
+    pub fn suspend_lanes(&mut self, suspended: bool) {
+        if suspended != (self.still & SUSPENDED != 0) {
+            self.keep_still(SUSPENDED, suspended);
+        }
+    }
+
+    fn keep_still(&mut self, why: u8, still: bool) {
+        self.still = if still { self.still | why } else { self.still & !why };
+        self.add_on.parts().0.set_airborne(self.still == 0);
     }
 
     /// Whether it is in the air, as far as was said ([`Flight::set_airborne`]).
     pub fn airborne(&self) -> bool {
-        !self.grounded
+        self.still & GROUNDED == 0
     }
 
     /// Adds an offset, m, world ENU, to the position reference from the next reference tick on: the independent dither without
@@ -337,14 +331,21 @@ impl<'m> Flight<'m> {
         if self.dither != Vector3::zeros() {
             self.reference.position += self.dither;
         }
-        if self.grounded {
+        if self.still & GROUNDED != 0 {
             loops.position.clear_integral();
         }
         (Some(loops.position.step(&self.reference, state)), released)
     }
 
+    /// Share of the largest thrust that the position loop last asked for, above 1 if it asked for more than there is; 0 if
+    /// another loop flies.
+    pub fn thrust_share(&self) -> f32 {
+        self.stage.loops.as_ref().map_or(0.0, |loops| loops.mixer.share(self.wanted.force.norm()))
+    }
+
     /// The second half of a control tick: what the motors get for what the position loop wants.
-    pub fn attitude_step(&self, wanted: &ThrustVector, state: &State) -> MotorCommand {
+    pub fn attitude_step(&mut self, wanted: &ThrustVector, state: &State) -> MotorCommand {
+        self.wanted = *wanted;
         match if state.is_physical() { Some(state) } else { self.state.as_ref() } {
             Some(state) => self.attitude_part(wanted, state),
             None => MotorCommand::OFF,

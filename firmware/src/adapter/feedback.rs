@@ -86,6 +86,11 @@ impl Feedback {
         }
     }
 
+    /// What was applied last on each axis.
+    pub(super) fn last(&self) -> [f32; MAX_AXES] {
+        self.axes.each_ref().map(AxisState::last)
+    }
+
     /// The lane is faded out.
     pub(super) fn clear_integrals(&mut self) {
         self.axes.iter_mut().for_each(AxisState::clear_integral);

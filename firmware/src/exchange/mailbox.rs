@@ -36,6 +36,11 @@ impl<const WORDS: usize> Mailbox<WORDS> {
         self.put_interrupted(stamp, words.iter().copied(), || ());
     }
 
+    /// Producer: replaces the value by so many words as there are, at most all of them.
+    pub fn put_from(&self, stamp: u32, words: impl Iterator<Item = u32>) {
+        self.put_interrupted(stamp, words, || ());
+    }
+
     /// Producer: replaces the value by numbers, bit by bit.
     pub fn put_floats(&self, stamp: u32, values: &[f32; WORDS]) {
         self.put_interrupted(stamp, values.iter().map(|value| value.to_bits()), || ());
@@ -44,6 +49,11 @@ impl<const WORDS: usize> Mailbox<WORDS> {
     /// Consumer: stamp and words of the newest value, once. `None` if there is no newer one, or it is half-written.
     pub fn take(&self) -> Option<(u32, [u32; WORDS])> {
         self.take_interrupted(|| ())
+    }
+
+    /// Consumer: [`Mailbox::take`] of a large value to where it shall be, which holds anything where there is `None`.
+    pub fn take_into(&self, words: &mut [u32; WORDS]) -> Option<u32> {
+        self.take_into_interrupted(words, || ())
     }
 
     /// Consumer: stamp and numbers of the newest value, as [`Mailbox::take`].
@@ -69,7 +79,13 @@ impl<const WORDS: usize> Mailbox<WORDS> {
         self.version.store(version.wrapping_add(2), Ordering::Release);
     }
 
-    fn take_interrupted(&self, mut interrupt: impl FnMut()) -> Option<(u32, [u32; WORDS])> {
+    fn take_interrupted(&self, interrupt: impl FnMut()) -> Option<(u32, [u32; WORDS])> {
+        let mut words = [0; WORDS];
+        let stamp = self.take_into_interrupted(&mut words, interrupt)?;
+        Some((stamp, words))
+    }
+
+    fn take_into_interrupted(&self, words: &mut [u32; WORDS], mut interrupt: impl FnMut()) -> Option<u32> {
         for _ in 0..ATTEMPTS {
             let before = self.version.load(Ordering::Acquire);
             // Half-written: on one core the producer can go on only after this returns.
@@ -78,7 +94,6 @@ impl<const WORDS: usize> Mailbox<WORDS> {
             }
             interrupt();
             let stamp = self.stamp.load(Ordering::Relaxed);
-            let mut words = [0; WORDS];
             for (word, place) in words.iter_mut().zip(&self.words) {
                 interrupt();
                 *word = place.load(Ordering::Relaxed);
@@ -88,7 +103,7 @@ impl<const WORDS: usize> Mailbox<WORDS> {
             fence(Ordering::Acquire);
             if self.version.load(Ordering::Relaxed) == before {
                 self.taken.store(before, Ordering::Relaxed);
-                return Some((stamp, words));
+                return Some(stamp);
             }
         }
         None

@@ -56,9 +56,14 @@ pub(crate) const CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO
 
 /// Check sum of a file: everything but the check sum's own four bytes.
 pub fn checksum(bytes: &[u8]) -> u32 {
+    checksum_around(bytes, 20)
+}
+
+/// Check sum of everything but the four bytes at a place, where it stands itself.
+pub(crate) fn checksum_around(bytes: &[u8], place: usize) -> u32 {
     let mut digest = CRC.digest();
-    digest.update(bytes.get(..20).unwrap_or_default());
-    digest.update(bytes.get(24..).unwrap_or_default());
+    digest.update(bytes.get(..place).unwrap_or_default());
+    digest.update(bytes.get(place.saturating_add(4)..).unwrap_or_default());
     digest.finalize()
 }
 

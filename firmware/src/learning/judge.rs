@@ -41,24 +41,28 @@ impl Judge {
         *self = Self { share: self.share, ..Self::default() };
     }
 
+    /// As [`Judge::start`], with a share that was well before.
+    pub(super) fn recall(&mut self, share: f32) {
+        *self = Self { share, ..Self::default() };
+    }
+
     /// The share that acts.
     pub(super) fn share(&self) -> f32 {
         self.share
     }
 
-    /// A tick; `floor` is an error that does not matter. `true`: what was learned does harm.
-    pub(super) fn tell(&mut self, with: f32, without: f32, floor: f32, rate_hz: f32) -> bool {
-        let part = 1.0 / (WINDOW * rate_hz);
+    /// A tick; `floor` is an error that does not matter, `pace` the ticks of a second. `true`: what was learned does harm.
+    pub(super) fn tell(&mut self, with: f32, without: f32, floor: f32, pace: f32) -> bool {
+        let part = 1.0 / (WINDOW * pace).max(1.0);
         self.with += (with * with - self.with) * part;
         self.without += (without * without - self.without) * part;
         let floor = floor * floor;
         let ratio = sqrt((self.with + 0.25 * floor) / (self.without + floor));
         // Written so that NaN is as bad as can be.
         let goal = if ratio < BAD { clamp((BAD - ratio) / (BAD - GOOD), LEAST, 1.0) } else { LEAST };
-        let step = GROWTH / rate_hz;
-        self.share = clamp(self.share + clamp(goal - self.share, -4.0 * step, step), 0.0, 1.0);
+        self.share = clamp(self.share + clamp(goal - self.share, -4.0 * GROWTH / pace, GROWTH / pace), 0.0, 1.0);
         self.harmful = if ratio < HARM { 0.0 } else { self.harmful + 1.0 };
-        let harm = self.harmful > PATIENCE * rate_hz;
+        let harm = self.harmful > PATIENCE * pace;
         if harm {
             *self = Self::default();
         }

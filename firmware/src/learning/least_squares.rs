@@ -10,6 +10,38 @@ use crate::math::{clamp, finite_or_zero, sqrt};
 /// A row surprises by at most this many standard deviations: what is more is an outlier, and counts as that.
 const GATE: f32 = 4.0;
 
+/// No row makes what it is about more certain than by this factor in the variance: one that would is of numbers that no axis has,
+/// and rounding would be all that is left of the covariance.
+const SUREST: f32 = 1e10;
+
+/// How sure unknowns are: their covariance U D U'.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Factors<const N: usize, const ABOVE: usize> {
+    /// D.
+    pub diagonal: [f32; N],
+    /// What of U is above its diagonal, column after column; the diagonal is 1.
+    pub upper: [f32; ABOVE],
+}
+
+impl<const N: usize, const ABOVE: usize> Factors<N, ABOVE> {
+    /// Variance of each unknown.
+    fn variances(&self) -> [f32; N] {
+        let mut variances = self.diagonal;
+        let mut upper = self.upper.as_slice();
+        for (j, diagonal) in self.diagonal.iter().enumerate() {
+            let (column, rest) = upper.split_at_checked(j).unwrap_or_default();
+            upper = rest;
+            for (variance, upper) in variances.iter_mut().zip(column) {
+                *variance += upper * upper * diagonal;
+            }
+        }
+        variances
+    }
+}
+
+/// A covariance is within its prior but for rounding.
+const WITHIN: f32 = 1.001;
+
 /// `N` unknowns; `ABOVE` is the number of entries above the diagonal of an N by N matrix, [`above`]`(N)`.
 #[derive(Clone, Debug)]
 pub struct LeastSquares<const N: usize, const ABOVE: usize> {
@@ -46,6 +78,11 @@ impl<const N: usize, const ABOVE: usize> LeastSquares<N, ABOVE> {
         dot(row, &self.x)
     }
 
+    /// Variance of `row . x`.
+    pub fn variance(&self, row: &[f32; N]) -> f32 {
+        self.diagonal.iter().zip(self.rotated(row)).fold(0.0, |sum, (d, f)| sum + d * f * f)
+    }
+
     /// U' row.
     fn rotated(&self, row: &[f32; N]) -> [f32; N] {
         let mut rotated = *row;
@@ -61,7 +98,8 @@ impl<const N: usize, const ABOVE: usize> LeastSquares<N, ABOVE> {
     }
 
     /// Learns from a row whose target has this noise, a standard deviation, after a share, 0..1, of what is known in the row's
-    /// direction was forgotten. A row or target that is not finite teaches nothing.
+    /// direction was forgotten. A row or target that is not finite, or out of all proportion
+    /// to the noise, teaches nothing.
     pub fn learn(&mut self, row: &[f32; N], target: f32, sigma: f32, share: f32) {
         let noise = sigma * sigma;
         let f = self.rotated(row);
@@ -71,7 +109,7 @@ impl<const N: usize, const ABOVE: usize> LeastSquares<N, ABOVE> {
         let growth = 1.0 / (1.0 - clamp(share, 0.0, 0.5));
         let total = noise + growth * variance;
         // Written so that NaN teaches nothing.
-        if !(surprise.abs() < f32::MAX && total < f32::MAX && noise > 0.0 && variance > f32::MIN_POSITIVE) {
+        if !(surprise.abs() < f32::MAX && total < SUREST * noise && noise > 0.0 && variance > f32::MIN_POSITIVE) {
             return;
         }
         let most = GATE * sqrt(total);
@@ -106,6 +144,25 @@ impl<const N: usize, const ABOVE: usize> LeastSquares<N, ABOVE> {
         }
     }
 
+    /// How sure the unknowns are.
+    pub fn factors(&self) -> Factors<N, ABOVE> {
+        Factors { diagonal: self.diagonal, upper: self.upper }
+    }
+
+    /// These unknowns, as sure as they were; as sure as a share of the prior's standard deviations, if nothing that was learned
+    /// with this prior can be so unsure.
+    pub fn recall(&mut self, x: &[f32; N], factors: &Factors<N, ABOVE>, share: f32) {
+        self.x = *x;
+        let mut pairs = factors.variances().into_iter().zip(self.prior);
+        // Written so that NaN is none.
+        let sound = pairs.all(|(variance, prior)| variance <= WITHIN * prior) && factors.diagonal.iter().all(|d| *d >= 0.0);
+        (self.upper, self.diagonal) = if sound {
+            (factors.upper, factors.diagonal)
+        } else {
+            ([0.0; ABOVE], self.prior.map(|variance| share * share * variance))
+        };
+    }
+
     /// Back to the prior.
     pub fn reset(&mut self) {
         (self.x, self.upper, self.diagonal) = ([0.0; N], [0.0; ABOVE], self.prior);
@@ -121,6 +178,7 @@ mod tests {
     use std::cmp::Ordering;
 
     use super::*;
+    use crate::learning::draw::draw;
     use proptest::prelude::*;
 
     const N: usize = 4;
@@ -135,12 +193,6 @@ mod tests {
             Ordering::Greater => 0.0,
         };
         core::array::from_fn(|a| core::array::from_fn(|b| (0..N).map(|j| upper(a, j) * found.diagonal[j] * upper(b, j)).sum()))
-    }
-
-    /// Numbers of -1..1.
-    fn draw(seed: &mut u32) -> f32 {
-        *seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (*seed >> 8) as f32 / 8_388_608.0 - 1.0
     }
 
     #[test]
@@ -191,6 +243,23 @@ mod tests {
     }
 
     proptest! {
+        /// A covariance that was learned comes back to the bit, and none that could not have been learned.
+        #[test]
+        fn what_is_recalled_is_as_sure_as_it_was_and_never_less_sure_than_at_first(
+            seed in any::<u32>(), rows in 0usize..300, odd in any::<([f32; N], [f32; above(N)])>()
+        ) {
+            let (mut found, mut seed) = (Four::new(&[1.0; N]), seed);
+            for _ in 0..rows {
+                found.learn(&[(); N].map(|()| draw(&mut seed)), draw(&mut seed), 0.1, 1e-2);
+            }
+            let mut next = Four::new(&[1.0; N]);
+            next.recall(found.values(), &found.factors(), 0.1);
+            prop_assert_eq!(next.factors(), found.factors());
+            prop_assert_eq!(next.values(), found.values());
+            next.recall(found.values(), &Factors { diagonal: odd.0, upper: odd.1 }, 0.1);
+            prop_assert!(next.factors().variances().iter().all(|variance| (0.0..=WITHIN).contains(variance)), "{next:?}");
+        }
+
         /// Rows of any size, some of them not finite, for long: the covariance stays positive and within the prior.
         #[test]
         fn the_covariance_is_sound_whatever_comes_in(

@@ -8,6 +8,8 @@ use crate::math::finite_or_zero;
 
 /// Most ticks of delay.
 pub(super) const MAX_DELAY: usize = 32;
+/// Words of a response that is kept.
+pub(super) const RESPONSE_WORDS: usize = 6;
 
 /// A second-order response behind a delay: the measured output at a tick is `gains . (u(t-1-delay), u(t-2-delay))` less
 /// `poles . (y(t-1), y(t-2))`.
@@ -59,14 +61,47 @@ impl Response {
         (first + second) / (1.0 + self.poles[0] + self.poles[1])
     }
 
+    /// Ticks by which a slow correction is answered late: the mean of the impulse response.
+    pub fn lag(&self) -> f32 {
+        let ([first, second], [newer, older]) = (self.gains, self.poles);
+        let late = (first + 2.0 * second) / (first + second) - (newer + 2.0 * older) / (1.0 + newer + older);
+        self.delay as f32 + late
+    }
+
     /// Natural frequency, rad a tick.
     pub fn turn(&self) -> f32 {
         self.turn
     }
 
+    /// Natural frequency, rad/s, damping ratio, and delay, s, at this rate, Hz.
+    pub(super) fn second_order_of(&self, rate_hz: f32) -> [f32; 3] {
+        let damping = -0.5 * libm::logf(self.poles[1]) / self.turn;
+        [self.turn * rate_hz, damping, self.delay as f32 / rate_hz]
+    }
+
     /// Ticks of delay.
     pub fn delay(&self) -> usize {
         self.delay
+    }
+
+    /// As words, to be kept.
+    pub(super) fn words(&self) -> [u32; RESPONSE_WORDS] {
+        let [first, second] = self.gains.map(f32::to_bits);
+        let [newer, older] = self.poles.map(f32::to_bits);
+        [first, second, newer, older, self.delay as u32, self.turn.to_bits()]
+    }
+
+    /// From [`Response::words`]; `None` if it is no stable response that a loop can have.
+    pub(super) fn from_words(words: [u32; RESPONSE_WORDS]) -> Option<Self> {
+        let [first, second, newer, older, delay, turn] = words;
+        let [gains, poles] = [[first, second], [newer, older]].map(|pair| pair.map(f32::from_bits));
+        let found = Self { gains, poles, delay: delay as usize, turn: f32::from_bits(turn) };
+        let [a1, a2] = poles;
+        // Both poles within the unit circle (Jury), written so that NaN is not.
+        let stable = a2.abs() < 1.0 && a1.abs() < 1.0 + a2;
+        let known = (1e-3..=1.0).contains(&found.turn) && found.delay <= MAX_DELAY;
+        let gain = found.gain().abs();
+        (stable && known && gain > 0.0 && gain < 1e6 && gains.iter().all(|gain| gain.abs() < 1e6)).then_some(found)
     }
 }
 
@@ -78,6 +113,9 @@ pub struct Filter {
 }
 
 impl Filter {
+    /// Always been at 0.
+    pub(super) const NONE: Self = Self { input: 0.0, outputs: [0.0; 2] };
+
     /// As if the input had been this for long.
     pub fn at_rest(response: &Response, input: f32) -> Self {
         Self { input, outputs: [response.gain() * input; 2] }
@@ -108,6 +146,11 @@ pub(super) struct Answer {
 impl Answer {
     pub(super) fn new() -> Self {
         Self { inputs: Ring::filled(0.0), filter: Filter::default() }
+    }
+
+    /// As if the correction had been this for long.
+    pub(super) fn at_rest(response: &Response, correction: f32) -> Self {
+        Self { inputs: Ring::filled(correction), filter: Filter::at_rest(response, correction) }
     }
 
     /// At a tick, before its correction is known.

@@ -20,6 +20,8 @@ pub enum Operation {
     WriteModel,
     /// Program the header, which makes the slot the newest.
     WriteHeader,
+    /// Program a record of a journal.
+    WriteRecord,
 }
 
 impl fmt::Display for Operation {
@@ -28,6 +30,7 @@ impl fmt::Display for Operation {
             Self::Erase => "erasing a slot",
             Self::WriteModel => "writing the model",
             Self::WriteHeader => "writing the slot's header",
+            Self::WriteRecord => "writing a record",
         })
     }
 }

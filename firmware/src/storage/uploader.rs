@@ -25,7 +25,7 @@ pub enum Arming {
 }
 
 impl Arming {
-    fn permit(self) -> Result<(), StorageError> {
+    pub(super) fn permit(self) -> Result<(), StorageError> {
         if self == Self::Disarmed { Ok(()) } else { Err(StorageError::Armed) }
     }
 }

@@ -1,7 +1,9 @@
 //! A servo with friction learns from nothing, while it runs, what its loop needs.
 //!
-//! *in* unseen smooth motions; *out* the error that is left; *never* a model; *source* the servo of the pilot of learning in
-//! flight: PD behind a delay, viscous and Coulomb friction, a slow random disturbance.
+//! *in* unseen smooth motions, and whole days of them; *out* the error that is left; *never* a model; *source* the servo of
+//! the pilot of learning in flight: PD behind a delay, viscous and Coulomb friction, a slow random disturbance.
+
+mod day;
 
 use impromptu_firmware::learning::{Learner, Limits, Measured, Parts, Response};
 use rand::{RngExt, SeedableRng};
@@ -82,6 +84,8 @@ fn fly(seed: u64, desired: &[f64], learner: Option<&mut Learner>, parts: Parts) 
 fn fly_on(mut servo: Servo, desired: &[f64], learner: Option<&mut Learner>, learn: Parts, act: Parts) -> f64 {
     let (mut sum, mut learner) = (0.0, learner);
     if let Some(learner) = &mut learner {
+        // The servo is a new one.
+        learner.release();
         learner.start(desired[0] as f32);
     }
     for (tick, goal) in desired.iter().enumerate() {
@@ -89,7 +93,7 @@ fn fly_on(mut servo: Servo, desired: &[f64], learner: Option<&mut Learner>, lear
         let (angle, speed) = servo.measured();
         let around = |offset: i32| desired[(tick as i32 + offset).clamp(0, desired.len() as i32 - 1) as usize] as f32;
         let correction = match &mut learner {
-            Some(learner) => learner.step(around, Some(Measured { value: angle, rate: speed }), learn, act),
+            Some(learner) => learner.step(around, Some(Measured { value: angle, rate: Some(speed) }), learn, act),
             None => 0.0,
         };
         servo.run(goal + f64::from(correction));
@@ -129,6 +133,26 @@ fn minutes_at_rest_wind_nothing_up() {
     assert!(after < 1.2 * before, "{after} after, {before} before");
 }
 
+/// What is ahead would make the servo set out before the step: that is worse than to be late.
+#[test]
+fn no_step_is_run_ahead_of() {
+    let mut learner = guessed();
+    (0..4).for_each(|stroke| {
+        fly(stroke, &motion(100 + stroke, 18), Some(&mut learner), Parts::BOTH);
+    });
+    // The last tick is that of the step.
+    let correction = |size: f64| {
+        let mut learner = learner.clone();
+        let desired: Vec<f64> = (0..=4 * HZ).map(|tick| if tick < 4 * HZ { 0.0 } else { size }).collect();
+        fly(6, &desired, Some(&mut learner), Parts::BOTH);
+        learner.correction()
+    };
+    let corrections = [0.2, 0.5, 1.0, -1.0].map(correction);
+    for other in corrections {
+        assert!((other - corrections[0]).abs() < 1e-3, "{corrections:?}");
+    }
+}
+
 #[test]
 fn a_loop_that_sags_is_followed() {
     let sagged = |stroke: u64| Servo { strength: 1.0 - 0.01 * stroke as f64, ..Servo::new(stroke) };
@@ -165,8 +189,6 @@ fn a_servo_learns_from_nothing_and_from_a_response_that_is_wrong() {
         let (mean, worst) = (later.iter().sum::<f64>() / later.len() as f64, later.iter().copied().fold(f64::MAX, f64::min));
         println!("{name}: first strokes {:.1?}, from the fifth on {mean:.1} / {worst:.1} %", &found[..4]);
         let guessed = *guessed.get_or_insert(mean);
-        // One that is half as fast takes longer.
-        let behind = if frequency < 7.0 { 4.0 } else { 3.0 };
-        assert!(mean >= 95.0 && worst >= 80.0 && mean >= guessed - behind, "{name}: {mean} / {worst}");
+        assert!(mean >= 95.0 && worst >= 80.0 && mean >= guessed - 3.0, "{name}: {mean} / {worst}");
     }
 }

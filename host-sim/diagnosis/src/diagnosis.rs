@@ -11,6 +11,7 @@ use crate::{
     add_on::Features,
     excitation::{self, Coverage},
     identification::{Identified, identify},
+    plausibility::moves,
     prediction::{Prediction, predict, window},
     properties::Properties,
     record::{FEWEST_ROWS, Record, RecordError},
@@ -126,8 +127,6 @@ pub struct Diagnosis {
 
 /// Most samples at the sub-rate that are looked at.
 const MOST_SAMPLES: usize = 16_000;
-/// Most samples of the record's own rate from which the rate is chosen.
-const GLANCE: usize = 40_000;
 /// Sub-rate in multiples of the band that passes the loop.
 const SAMPLES_A_PERIOD: f64 = 16.0;
 /// Coefficients that the reference has to tell apart.
@@ -162,7 +161,6 @@ pub struct Assessment {
 /// If the record is too short, excites nothing, or no model explains it.
 pub fn assess(record: &Record, settings: &Settings) -> Result<Assessment, DiagnosisError> {
     let rate_hz = 1.0 / record.period_s;
-    let moves = |values: &[f64]| values.windows(2).any(|pair| pair[0] != pair[1]);
     if !record.segments.iter().any(|segment| moves(&segment.reference)) {
         return Err(DiagnosisError::NoExcitation);
     }
@@ -173,11 +171,11 @@ pub fn assess(record: &Record, settings: &Settings) -> Result<Assessment, Diagno
         Some(asked) if !(asked > 0.0 && asked <= 1.01 * rate_hz) => return Err(DiagnosisError::SubRate { asked, rate: rate_hz }),
         Some(asked) => (rate_hz / asked).round().max(1.0) as usize,
         None => {
-            let band = excitation::band(&record.clone().shorter(GLANCE));
+            let band = excitation::band_at_any_rate(record);
             (rate_hz / (SAMPLES_A_PERIOD * band)).floor().max(1.0) as usize
         }
     };
-    let record = record.slower(divisor).shorter(MOST_SAMPLES);
+    let record = record.slower(divisor).shorter(MOST_SAMPLES).centred();
     let sub_rate_hz = rate_hz / divisor as f64;
     if record.len() < FEWEST_ROWS || record.shortest() < FEWEST_ROWS / 2 {
         return Err(DiagnosisError::Short { rows: record.len(), sub_rate_hz, needed: FEWEST_ROWS });
@@ -205,7 +203,7 @@ pub fn assess(record: &Record, settings: &Settings) -> Result<Assessment, Diagno
     // The mean before decimation leaves zeros at half the sub-rate that are its own, not the loop's.
     let trusted_hz = if divisor > 1 { 0.25 * sub_rate_hz } else { 0.5 * sub_rate_hz };
     let coverage = excitation::coverage(&record, properties.bandwidth_hz.value, lowest_hz, trusted_hz);
-    let gates = Gates::of(&properties, &coverage);
+    let gates = Gates::of(&properties, &coverage, 0.5 * sub_rate_hz);
     Ok(Assessment { rate_hz, sub_rate_hz, identified, draws, properties, coverage, gates, record })
 }
 

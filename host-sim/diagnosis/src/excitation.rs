@@ -111,6 +111,29 @@ pub fn band(record: &Record) -> f64 {
     0.5 / record.period_s
 }
 
+/// Most samples at one rate from which a band is taken, and fewest.
+const GLANCE: usize = 40_000;
+const FEWEST: usize = 256;
+/// A band is shown by the rate at which it is this many lines wide at least, and at most this share of the rate.
+const LINES: f64 = 3.0;
+const SHARE: f64 = 0.3;
+
+/// [`band`] of a record of any rate. What is logged much faster than the loop answers shows it in its first line or not at all,
+/// below the noise of the increments: then the band is that of the record at a half of the rate, a quarter, and so on.
+pub fn band_at_any_rate(record: &Record) -> f64 {
+    let mut divisor = 1;
+    while record.longest() / divisor >= FEWEST {
+        let slower = record.slower(divisor).shorter(GLANCE);
+        let found = band(&slower);
+        let spacing_hz = 1.0 / (window(&slower) as f64 * slower.period_s);
+        if (LINES * spacing_hz..=SHARE / slower.period_s).contains(&found) {
+            return found;
+        }
+        divisor *= 2;
+    }
+    band(&record.clone().shorter(GLANCE))
+}
+
 /// Share of the reference's variance that lies at the lowest frequency and below.
 const SLOW_SHARE: f64 = 0.05;
 

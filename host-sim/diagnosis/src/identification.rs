@@ -43,6 +43,8 @@ const MOST_BLOCKS: usize = 60;
 const WORSE: f64 = 1.5;
 /// Longest dead time tried, ticks.
 const LONGEST_DEAD_TIME: usize = 12;
+/// The same of a loop that is seen to answer later.
+const LATEST: usize = 100;
 
 struct Candidate {
     model: TransferFunction,
@@ -60,16 +62,33 @@ struct Whitened {
     rows: usize,
 }
 
+/// Dead times that are tried, ticks: [`LONGEST_DEAD_TIME`], or up to the lag at which the two columns move most alike, if that is
+/// twice as late and more: a loop answers before that.
+fn longest_dead_time(record: &Record) -> usize {
+    let most = (record.shortest() / 6).min(LATEST);
+    let alike = |lag: usize| -> f64 {
+        let of = |segment: &Segment| -> f64 {
+            let moved = |values: &[f64], tick: usize| values[tick + 1] - values[tick];
+            let ticks = 0..segment.reference.len().saturating_sub(lag + 1);
+            ticks.map(|tick| moved(&segment.reference, tick) * moved(&segment.measured, tick + lag)).sum()
+        };
+        record.segments.iter().map(of).sum::<f64>().abs()
+    };
+    let best = (0..=most).map(|lag| (lag, alike(lag))).max_by(|a, b| a.1.total_cmp(&b.1));
+    best.map_or(LONGEST_DEAD_TIME, |(lag, _)| if lag >= 2 * LONGEST_DEAD_TIME { lag } else { LONGEST_DEAD_TIME })
+}
+
 /// Identifies the channel; `None` if no stable model explains anything.
 pub fn identify(record: &Record) -> Option<Identified> {
     let arx = Arx::fit(record)?;
-    let whitened = Whitened::new(record, &arx);
+    let longest = longest_dead_time(record);
+    let whitened = Whitened::new(record, &arx, longest);
     if whitened.rows < 40 {
         return None;
     }
     let mut candidates: Vec<Candidate> = Vec::new();
     // Where the dead time lies is seen with few coefficients; the rest is tried round it.
-    for dead_time in 0..=LONGEST_DEAD_TIME {
+    for dead_time in (0..=LONGEST_DEAD_TIME).chain((LONGEST_DEAD_TIME + 2..=longest).step_by(2)) {
         candidates.extend([(2, 1), (2, 2), (3, 3)].into_iter().filter_map(|(n, m)| whitened.fit(n, m, dead_time)));
     }
     let near = best(&candidates)?.model.dead_time;
@@ -87,8 +106,7 @@ pub fn identify(record: &Record) -> Option<Identified> {
         let of = candidates.iter().filter(|candidate| candidate.model.dead_time == dead_time);
         of.map(|candidate| candidate.criterion).fold(f64::INFINITY, f64::min)
     };
-    let weights: Vec<(usize, f64)> =
-        (0..=LONGEST_DEAD_TIME + 2).map(|d| (d, (0.5 * (chosen.criterion - least(d))).exp())).collect();
+    let weights: Vec<(usize, f64)> = (0..=longest + 2).map(|d| (d, (0.5 * (chosen.criterion - least(d))).exp())).collect();
     let total: f64 = weights.iter().map(|(_, weight)| weight).sum();
     let mut model = chosen.model.clone();
     level(&mut model, record);
@@ -174,9 +192,9 @@ impl TransferFunction {
 }
 
 impl Whitened {
-    fn new(record: &Record, arx: &Arx) -> Self {
+    fn new(record: &Record, arx: &Arx, longest: usize) -> Self {
         let shortest = record.segments.iter().map(|segment| segment.measured.len()).min().unwrap_or(0);
-        let skipped = (arx.order + LONGEST_DEAD_TIME + 8).min(shortest / 4);
+        let skipped = (arx.order + longest + 8).min(shortest / 4);
         let segments = record.segments.iter().map(|segment| Segment {
             reference: filter(&arx.whitening, &[1.0], &segment.reference),
             measured: filter(&arx.whitening, &[1.0], &segment.measured),

@@ -16,6 +16,7 @@
 //! | layer | modules | what they hold |
 //! |---|---|---|
 //! | 1 | `polynomial`, `record`, `cholesky` | roots and filters; signals in step; positive definite systems |
+//! | 1 | `plausibility`, `digits` | whether columns can be what they are taken for; numbers for people |
 //! | 2 | `transfer_function`, `least_squares` | a rational function of z; the regression with its covariance |
 //! | 3 | `arx`, `excitation`, `add_on` | lagged regressors; what the log can tell at all; the add-on that is assumed |
 //! | 4 | `identification` | order, dead time, model and covariance |
@@ -29,9 +30,11 @@ pub mod add_on;
 pub mod arx;
 pub mod cholesky;
 pub mod diagnosis;
+pub mod digits;
 pub mod excitation;
 pub mod identification;
 pub mod least_squares;
+pub mod plausibility;
 pub mod polynomial;
 pub mod prediction;
 pub mod properties;

@@ -120,6 +120,17 @@ impl Record {
         Ok(Self { period_s, segments: vec![segment] })
     }
 
+    /// The record round the mean of its reference: a constant in both columns says nothing of the loop, and large ones cost
+    /// digits.
+    #[must_use]
+    pub fn centred(mut self) -> Self {
+        let mean = self.segments.iter().flat_map(|segment| &segment.reference).sum::<f64>() / self.len().max(1) as f64;
+        for Segment { reference, measured } in &mut self.segments {
+            reference.iter_mut().chain(measured).for_each(|value| *value -= mean);
+        }
+        self
+    }
+
     /// All records as one.
     ///
     /// # Errors

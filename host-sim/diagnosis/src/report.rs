@@ -3,8 +3,9 @@
 use crate::{
     Diagnosis,
     add_on::Features,
+    digits::digits,
     properties::{Interval, RelativeDegree, THRESHOLD},
-    verdict::{FAR, Gate, LEAST_REDUCTION, Verdict, judged_zeros},
+    verdict::{FAR, Gate, LEAST_REDUCTION, Verdict, is_beyond, judged_zeros},
 };
 
 /// Width of the text, characters.
@@ -94,10 +95,10 @@ impl Diagnosis {
         lines.push(line(
             "recommended",
             format!(
-                "sub-rate {:.3} Hz, preview {:.3} s, desired output from {:.3} s ago to there, {features}",
-                self.recommended_sub_rate_hz,
-                self.recommended_preview_s,
-                prediction.window.past as f64 / self.sub_rate_hz
+                "sub-rate {} Hz, preview {} s, desired output from {} s ago to there, {features}",
+                digits(self.recommended_sub_rate_hz),
+                digits(self.recommended_preview_s),
+                digits(prediction.window.past as f64 / self.sub_rate_hz)
             ),
         ));
         lines.push(line(
@@ -119,15 +120,16 @@ impl Diagnosis {
             "relative degree",
             format!(
                 "{} strict (first coefficient that the data tell from zero); {} practical (first tick above {:.0} % of the \
-                 step); ticks of {tick:.1} ms",
+                 step); ticks of {} ms",
                 degree(properties.strict_degree),
                 degree(properties.practical_degree),
-                100.0 * THRESHOLD
+                100.0 * THRESHOLD,
+                digits(tick)
             ),
         ));
         lines.push(line(
             "steady-state gain",
-            format!("{}, from {:.2} Hz and above", interval(properties.gain, 3), self.coverage.lowest_hz),
+            format!("{}, from {} Hz and above", interval(properties.gain, 3), digits(self.coverage.lowest_hz)),
         ));
         lines.push(line("output at zero", format!("{} {unit}", interval(properties.offset, 4))));
         lines.push(line("initial reversal", self.reversal_text()));
@@ -149,9 +151,9 @@ impl Diagnosis {
         lines.push(line("poles", format!("|z| {poles}")));
         lines.push(line(
             "lag of slow signals",
-            format!("{} s; settles in {:.2} s", interval(properties.lag_s, 3), properties.settling_s),
+            format!("{} s; settles in {} s", of_digits(properties.lag_s), digits(properties.settling_s)),
         ));
-        lines.push(line("bandwidth (-3 dB)", format!("{} Hz", interval(properties.bandwidth_hz, 2))));
+        lines.push(line("bandwidth (-3 dB)", self.bandwidth_text()));
         lines.push(line(
             "noise floor",
             format!(
@@ -163,19 +165,34 @@ impl Diagnosis {
         lines.push(line(
             "excitation",
             format!(
-                "{:.0} % of the band up to the bandwidth is above the noise, the highest at {:.2} Hz",
+                "{:.0} % of the band up to the bandwidth is above the noise, the highest at {} Hz",
                 100.0 * self.coverage.share,
-                self.coverage.highest_hz
+                digits(self.coverage.highest_hz)
             ),
         ));
         lines.push(line(
             "identified from",
             format!(
-                "{} samples at {:.2} Hz (log: {:.2} Hz); intervals hold 95 % of the linear models that could be true; seed {}",
-                self.samples, self.sub_rate_hz, self.rate_hz, self.seed
+                "{} samples at {} Hz (log: {} Hz); intervals hold 95 % of the linear models that could be true; seed {}",
+                self.samples,
+                digits(self.sub_rate_hz),
+                digits(self.rate_hz),
+                self.seed
             ),
         ));
         lines
+    }
+
+    /// A model that never falls by 3 dB has no bandwidth below half of its rate.
+    fn bandwidth_text(&self) -> String {
+        let bandwidth = self.properties.bandwidth_hz;
+        let most = 0.5 * self.sub_rate_hz;
+        if is_beyond(bandwidth.value, most) {
+            return format!("above {} Hz, the highest that this sub-rate shows", digits(most));
+        }
+        let high =
+            if is_beyond(bandwidth.high, most) { "and above".to_owned() } else { format!("… {}", digits(bandwidth.high)) };
+        format!("{} ({} {high}) Hz", digits(bandwidth.value), digits(bandwidth.low))
     }
 
     fn reversal_text(&self) -> String {
@@ -199,6 +216,10 @@ fn degree(degree: RelativeDegree) -> String {
     } else {
         format!("{} ({} … {})", degree.value, degree.low, degree.high)
     }
+}
+
+fn of_digits(interval: Interval) -> String {
+    format!("{} ({} … {})", digits(interval.value), digits(interval.low), digits(interval.high))
 }
 
 fn interval(interval: Interval, decimals: usize) -> String {

@@ -6,6 +6,7 @@
 use serde::Serialize;
 
 use crate::{
+    digits::digits,
     excitation::Coverage,
     prediction::Prediction,
     properties::{Place, Properties, Zero},
@@ -54,12 +55,12 @@ const LEAST_COVERAGE: f64 = 0.5;
 pub const LEAST_REDUCTION: f64 = 5.0;
 
 impl Gates {
-    /// The gates of a channel.
-    pub fn of(properties: &Properties, coverage: &Coverage) -> Self {
+    /// The gates of a channel that was identified at twice `half_rate_hz`.
+    pub fn of(properties: &Properties, coverage: &Coverage, half_rate_hz: f64) -> Self {
         Self {
             unit_gain: unit_gain(properties),
             stable_inverse: stable_inverse(properties, coverage),
-            excitation: excitation(properties, coverage),
+            excitation: excitation(properties, coverage, half_rate_hz),
         }
     }
 
@@ -124,10 +125,13 @@ fn unit_gain(properties: &Properties) -> Gate {
 /// A zero further out than this is a dead time that is a tick longer, up to a tenth of the first coefficient: preview undoes it.
 pub const FAR: f64 = 10.0;
 
+/// A smooth trajectory asks nothing of the inverse at so many times the bandwidth.
+const JUDGED: f64 = 10.0;
+
 /// Zeros that are judged: at frequencies that the record shows (at faster ones neither the log nor a smooth trajectory asks
-/// anything of the inverse) and not [`FAR`] out.
+/// anything of the inverse), up to ten times the bandwidth, and not [`FAR`] out.
 pub fn judged_zeros<'a>(properties: &'a Properties, coverage: &Coverage) -> impl Iterator<Item = &'a Zero> + use<'a> {
-    let highest = 1.02 * coverage.highest_hz;
+    let highest = (1.02 * coverage.highest_hz).min(JUDGED * properties.bandwidth_hz.value);
     properties.zeros.iter().filter(move |zero| zero.frequency_hz <= highest && zero.magnitude.value < FAR)
 }
 
@@ -150,16 +154,28 @@ fn stable_inverse(properties: &Properties, coverage: &Coverage) -> Gate {
     }
 }
 
-fn excitation(properties: &Properties, coverage: &Coverage) -> Gate {
-    let percent = 100.0 * coverage.share;
-    if coverage.share < LEAST_COVERAGE {
-        Gate::Failed(format!(
-            "the reference shows only {percent:.0} % of the loop's band (0 … {:.2} Hz) above the noise: fly steps, or many \
-             tones up to there",
-            properties.bandwidth_hz.value
+/// Whether a bandwidth is where the search for it ended, at half the sub-rate.
+pub(crate) fn is_beyond(bandwidth_hz: f64, half_rate_hz: f64) -> bool {
+    bandwidth_hz >= 0.98 * half_rate_hz
+}
+
+fn excitation(properties: &Properties, coverage: &Coverage, half_rate_hz: f64) -> Gate {
+    let (percent, bandwidth_hz) = (100.0 * coverage.share, properties.bandwidth_hz.value);
+    if coverage.share >= LEAST_COVERAGE {
+        Gate::Passed
+    } else if is_beyond(bandwidth_hz, half_rate_hz) {
+        Gate::Undecided(format!(
+            "the loop's band ends above {} Hz, the highest that this sub-rate shows, and the reference shows {} Hz of it: a \
+             higher --sub-rate or less noise decides",
+            digits(half_rate_hz),
+            digits(coverage.highest_hz)
         ))
     } else {
-        Gate::Passed
+        Gate::Failed(format!(
+            "the reference shows only {percent:.0} % of the loop's band (0 … {} Hz) above the noise: fly steps, or many \
+             tones up to there",
+            digits(bandwidth_hz)
+        ))
     }
 }
 

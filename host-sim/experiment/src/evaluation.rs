@@ -5,7 +5,7 @@ use impromptu_model_export::{ExportError, verify};
 use impromptu_report::{FlightTrace, LaneOutcome, Margins, Method, ModelCard, PerFlight};
 use impromptu_sim::{
     flight_log::FlightLog,
-    flights::{Guessed, Loop},
+    flights::{Loop, Response},
     learned::{LearningLoop, after, teaching},
     rollout::{FlightPlan, RolloutError},
     trajectory::{Trajectory, TrajectoryError},
@@ -96,7 +96,7 @@ pub fn learned(
     seconds: u32,
 ) -> Result<Vec<f64>, EvaluationError> {
     let teach = teaching(flight_seed, seconds, speed, closed_loop.rate_hz())?;
-    let learned = LearningLoop { closed_loop, model, parts: Parts::BOTH, guessed: Guessed::RIGHT, seed: flight_seed };
+    let learned = LearningLoop { closed_loop, model, parts: Parts::BOTH, response: Response::Commissioned, seed: flight_seed };
     Ok(after(&learned, seconds, &teach, trajectories)?.errors)
 }
 

@@ -14,7 +14,11 @@
 //! | the first 80 | no: nobody knows what the loop was asked before |
 //! | the last 80 | no: nobody knows where the trajectory would have gone on |
 
-use impromptu_firmware::learning::{AHEAD, Filter, Learner, Limits, Measured, Parts, Response};
+use impromptu_firmware::{
+    learning::{AHEAD, Filter, Kept, Learner, Limits, Measured, Parts, Response, identity},
+    model::{Channel, Channels},
+    preview::EndRule,
+};
 use impromptu_training::track::Track;
 use serde::Serialize;
 
@@ -145,6 +149,9 @@ pub struct Replay {
     pub otherwise: [f64; 2],
     /// Time of flight that was learned from, min.
     pub learned_min: f64,
+    /// What was learned of all flights, as a learner keeps it ([`Kept`]): of signals that have the names of the axes.
+    #[serde(skip)]
+    pub learned: Vec<u8>,
 }
 
 /// An axis at the learner's rate.
@@ -213,7 +220,7 @@ impl Loop {
                 let answer_rate = f64::from(filter.change()) * self.rate_hz;
                 let desired = |offset: i32| signals.desired(tick as i64 + i64::from(offset));
                 let learn = if tick < UNKNOWN { Parts::NONE } else { learn };
-                let measured_then = Measured { value: (measured + answer) as f32, rate: (rate + answer_rate) as f32 };
+                let measured_then = Measured { value: (measured + answer) as f32, rate: Some((rate + answer_rate) as f32) };
                 corrections.push(learner.step(desired, Some(measured_then), learn, Parts::BOTH));
                 if tick >= UNKNOWN {
                     counted += 1;
@@ -226,7 +233,7 @@ impl Loop {
     }
 
     /// Every flight after the ones before it.
-    fn fly_all(mut self, flights: &[(&str, Vec<Signals>)]) -> Vec<Predicted> {
+    fn fly_all(&mut self, flights: &[(&str, Vec<Signals>)]) -> Vec<Predicted> {
         let mut learned_s = 0.0;
         flights
             .iter()
@@ -248,6 +255,20 @@ impl Loop {
                 }
             })
             .collect()
+    }
+}
+
+impl Loop {
+    /// What the learners keep.
+    fn kept(&self, tracks: &[Track]) -> Vec<u8> {
+        let channels: Vec<Channel<'_>> =
+            tracks.iter().map(|track| Channel { name: &track.name, unit: "", frame: "", end: EndRule::Hold }).collect();
+        let signals = Channels { desired: &channels, measured: &channels, reference: &channels };
+        let rate_hz = self.rate_hz as f32;
+        let count = self.learners.len();
+        let mut bytes = vec![0; Kept::length(count)];
+        let axes = self.learners.iter().map(Learner::kept);
+        Kept::write(&mut bytes, identity(signals, rate_hz, None), rate_hz, count, axes).map(<[u8]>::to_vec).unwrap_or_default()
     }
 }
 
@@ -291,7 +312,7 @@ impl Replay {
         let still = || ReplayError::Still { flight: first.name.clone() };
         let learner = Learner::new(answer, rate_hz as f32, 0.0, limits(bound)).ok_or_else(still)?;
         let learners = vec![learner; first.tracks.len()];
-        let closed_loop = Loop { rate_hz, answer, learners };
+        let mut closed_loop = Loop { rate_hz, answer, learners };
         let signals: Vec<(&str, Vec<Signals>)> = flights
             .iter()
             .map(|flight| (flight.name.as_str(), flight.tracks.iter().map(|track| Signals::of(track, rate_hz)).collect()))
@@ -304,8 +325,9 @@ impl Replay {
         });
         let measured_rate = flights.iter().flat_map(|flight| &flight.tracks).all(|track| track.rate.is_some());
         let flights = closed_loop.fly_all(&signals);
+        let learned = closed_loop.kept(&first.tracks);
         let learned_min = flights.iter().map(|flight| flight.seconds).sum::<f64>() / 60.0;
-        Ok(Self { response, identified_from, misfit, rate_hz, log_hz, measured_rate, flights, otherwise, learned_min })
+        Ok(Self { response, identified_from, misfit, rate_hz, log_hz, measured_rate, flights, otherwise, learned_min, learned })
     }
 }
 

@@ -7,7 +7,7 @@ use impromptu_flight::{
     flight::Settings,
     link::{
         Command, FRAME, Outcome, Reason, Receiver, Report, Reports, Sender,
-        message::{Inertial, LaneReport, Position, Telemetry, TimedSetpoint},
+        message::{Inertial, LaneReport, LearningReport, Position, Telemetry, TimedSetpoint},
     },
     types::{MotorCommand, Reference, Setpoint, State, Tick},
 };
@@ -27,7 +27,7 @@ const CATCH_UP: usize = 5;
 /// A piece of a model among the commands.
 const PIECE: &str = "a piece of the model";
 /// How often a piece is sent, and how many control ticks in lockstep its outcome is awaited: a commit runs the model's probes.
-const ATTEMPTS: usize = 50;
+pub(super) const ATTEMPTS: usize = 50;
 const LOCKSTEP_WAIT: usize = 25;
 
 /// What the microcontroller measured of itself.
@@ -57,11 +57,14 @@ pub struct Board<L> {
     /// Frames of the next exchange.
     outgoing: Vec<u8>,
     telemetry: Telemetry,
+    pub(super) learning: Option<LearningReport>,
+    /// What came of what was learned, and its whole length.
+    pub(super) learned: (Vec<u8>, usize),
     /// What the last exchange brought.
     motors: Option<(Tick, MotorCommand, Reference)>,
-    refusals: Vec<(&'static str, Reason)>,
+    pub(super) refusals: Vec<(&'static str, Reason)>,
     /// Commands whose acknowledgement is awaited.
-    awaited: Vec<(u8, &'static str)>,
+    pub(super) awaited: Vec<(u8, &'static str)>,
     model: Option<Option<u32>>,
     /// Reports that did not arrive.
     lost: u32,
@@ -80,6 +83,8 @@ impl<L: Line> Board<L> {
             receiver: Receiver::new(),
             outgoing: Vec::new(),
             telemetry: Telemetry::default(),
+            learning: None,
+            learned: (Vec::new(), 0),
             motors: None,
             refusals: Vec::new(),
             awaited: Vec::new(),
@@ -122,6 +127,16 @@ impl<L: Line> Board<L> {
         Ok(BoardFlight { divisor: settings.rates.position_divisor.max(1), next: 0, reference: Reference::default(), board: self })
     }
 
+    /// Motors off after a flight, until another is [prepared](Board::prepare).
+    ///
+    /// # Errors
+    /// If the firmware does not answer.
+    pub fn disarm(&mut self) -> Result<(), PilError> {
+        self.tell("disarm", &Command::Disarm);
+        self.talk(|board| board.awaited.is_empty());
+        self.refused()
+    }
+
     /// What the firmware measured of itself, as it last told.
     pub fn figures(&self) -> Figures {
         let telemetry = &self.telemetry;
@@ -161,13 +176,7 @@ impl<L: Line> Board<L> {
             // Ends whatever the line has invented.
             self.outgoing.push(0);
             self.tell(PIECE, piece);
-            self.talk(|board| board.stored.is_some());
-            for _ in 0..LOCKSTEP_WAIT {
-                if self.stored.is_some() || !self.lockstep {
-                    break;
-                }
-                self.talk(|_| true);
-            }
+            self.talk_until(|board| board.stored.is_some());
             if self.failure.is_some() {
                 return Err(self.failed(PIECE));
             }
@@ -183,7 +192,7 @@ impl<L: Line> Board<L> {
         }
     }
 
-    fn tell(&mut self, name: &'static str, command: &Command<'_>) {
+    pub(super) fn tell(&mut self, name: &'static str, command: &Command<'_>) {
         let mut frame = [0; FRAME];
         // Every command of this file fits into a frame.
         let Some((sequence, frame)) = self.sender.encode(command, &mut frame) else { return };
@@ -194,7 +203,7 @@ impl<L: Line> Board<L> {
     }
 
     /// Sends what was told and hears until `done`, or until patience ends.
-    fn talk(&mut self, done: impl Fn(&Self) -> bool) {
+    pub(super) fn talk(&mut self, done: impl Fn(&Self) -> bool) {
         // A zero first: what was left on the line shall not cost a frame.
         let outgoing = std::mem::replace(&mut self.outgoing, vec![0]);
         let answer = self.line.exchange(&outgoing);
@@ -203,6 +212,17 @@ impl<L: Line> Board<L> {
         while !self.lockstep && !done(self) && self.failure.is_none() && start.elapsed() < PATIENCE {
             let answer = self.line.wait(PATIENCE);
             self.on_bytes(answer);
+        }
+    }
+
+    /// [`Board::talk`] of what a task of lower priority does: in lockstep, where each exchange is one tick, for some ticks.
+    pub(super) fn talk_until(&mut self, done: impl Fn(&Self) -> bool) {
+        self.talk(&done);
+        for _ in 0..LOCKSTEP_WAIT {
+            if done(self) || !self.lockstep {
+                break;
+            }
+            self.talk(|_| true);
         }
     }
 
@@ -225,6 +245,14 @@ impl<L: Line> Board<L> {
                     }
                     Report::Telemetry(telemetry) => self.telemetry = telemetry,
                     Report::Inputs(_) => {}
+                    Report::Learning(learning) => self.learning = Some(learning),
+                    Report::Learned(piece) => {
+                        let (bytes, length) = &mut self.learned;
+                        if piece.offset as usize == bytes.len() {
+                            bytes.extend(piece.bytes);
+                            *length = piece.length as usize;
+                        }
+                    }
                     Report::Identity(identity) => self.model = Some(identity.model.map(|model| model.checksum)),
                     Report::Acknowledge { sequence, outcome } => {
                         let place = self.awaited.iter().position(|(awaited, _)| *awaited == sequence);
@@ -242,7 +270,7 @@ impl<L: Line> Board<L> {
         }
     }
 
-    fn refused(&mut self) -> Result<(), PilError> {
+    pub(super) fn refused(&mut self) -> Result<(), PilError> {
         match self.refusals.pop() {
             Some((command, reason)) => Err(PilError::Refused { command, reason }),
             None => self.failure.take().map_or(Ok(()), |error| Err(PilError::Line(error, String::new()))),

@@ -31,8 +31,8 @@ pub struct Emulated {
     shift: u32,
 }
 
-/// Files that stand for the slots of the flash: the firmware writes them when it stores a model.
-const SLOTS: [&str; 2] = ["slot0.bin", "slot1.bin"];
+/// Files that stand for the slots of the flash, in its order: the firmware writes them when it stores something.
+const SLOTS: [&str; flash::SLOTS] = ["learned.bin", "slot0.bin", "slot1.bin"];
 
 impl Drop for Emulated {
     fn drop(&mut self) {
@@ -72,7 +72,21 @@ pub fn firmware() -> Result<PathBuf> {
 /// # Errors
 /// If the target or the emulator is missing, with the line that installs it; if the firmware does not start.
 pub fn start(model: Option<&[u8]>, link: LinkKind, shift: u32) -> Result<(Emulated, Board<Box<dyn Line>>), PilError> {
-    let (emulated, line) = connect(&firmware()?, &[], model, link, shift)?;
+    start_recalling(model, &[], link, shift)
+}
+
+/// [`start`], with what was kept of a learner in the flash too.
+///
+/// # Errors
+/// As [`start`].
+pub fn start_recalling(
+    model: Option<&[u8]>,
+    learned: &[u8],
+    link: LinkKind,
+    shift: u32,
+) -> Result<(Emulated, Board<Box<dyn Line>>), PilError> {
+    let folder = flashed(model, learned)?;
+    let (emulated, line) = power(folder, firmware()?, &[], link, shift)?;
     Ok((emulated, Board::new(line, link == LinkKind::Lockstep)))
 }
 
@@ -87,11 +101,16 @@ pub fn connect(
     link: LinkKind,
     shift: u32,
 ) -> Result<(Emulated, Box<dyn Line>), PilError> {
+    power(flashed(model, &[])?, elf.to_owned(), further, link, shift)
+}
+
+/// A folder with what the flash holds at the start.
+fn flashed(model: Option<&[u8]>, learned: &[u8]) -> Result<TemporaryFolder> {
     let folder = TemporaryFolder::new().context("cannot make a folder for the emulator")?;
-    if let Some(bytes) = model {
-        fs::write(folder.path().join(SLOTS[0]), flash::slot(bytes)).context("cannot write the model")?;
+    for (name, bytes) in SLOTS.into_iter().zip([learned.to_vec(), model.map_or_else(Vec::new, flash::slot)]) {
+        fs::write(folder.path().join(name), bytes).context("cannot write what the flash holds")?;
     }
-    power(folder, elf.to_owned(), further, link, shift)
+    Ok(folder)
 }
 
 /// Power off and on again: the models in flash stay.

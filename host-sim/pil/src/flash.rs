@@ -1,4 +1,4 @@
-//! Models in the flash of a binary that is not running yet, as an uploader would leave them.
+//! Models, and what was learned, in the flash of a binary that is not running yet, as the firmware would leave them.
 //!
 //! *in* an ELF file with a segment for the slots, and what each slot shall hold; *out* the ELF file that an emulator loads;
 //! *never* a byte outside of that segment; *source* ELF-32; `firmware/board/src/slots.rs` and `memory.x` for the segment.
@@ -17,6 +17,8 @@ use object::{
 
 /// Bytes of a slot.
 pub(super) const SLOT: usize = 128 * 1024;
+/// Slots, in the order of the flash: what was learned, models.
+pub(super) const SLOTS: usize = 3;
 
 /// What an upload with number 0 leaves in a slot.
 pub(super) fn slot(model: &[u8]) -> Vec<u8> {
@@ -25,7 +27,7 @@ pub(super) fn slot(model: &[u8]) -> Vec<u8> {
 }
 
 /// The binary with these slots in its flash.
-pub(super) fn flash(elf: &[u8], slots: &[Vec<u8>; 2]) -> Result<Vec<u8>> {
+pub(super) fn flash(elf: &[u8], slots: &[Vec<u8>; SLOTS]) -> Result<Vec<u8>> {
     let endian = LittleEndian;
     let header = FileHeader32::<LittleEndian>::parse(elf).context("not an ELF file")?;
     let segments = header.program_headers(endian, elf).context("an ELF file without segments")?;
@@ -33,15 +35,15 @@ pub(super) fn flash(elf: &[u8], slots: &[Vec<u8>; 2]) -> Result<Vec<u8>> {
     let index = segments
         .iter()
         .position(|segment| {
-            segment.p_type(endian) == PT_LOAD && segment.p_filesz(endian) == 0 && segment.p_memsz(endian) as usize == 2 * SLOT
+            segment.p_type(endian) == PT_LOAD && segment.p_filesz(endian) == 0 && segment.p_memsz(endian) as usize == SLOTS * SLOT
         })
         .context("the binary keeps no flash for models")?;
     let mut image = Vec::new();
-    for (slot, end) in slots.iter().zip([SLOT, 2 * SLOT]) {
-        ensure!(slot.len() <= SLOT, "a model of {} bytes does not fit into a slot of {SLOT}", slot.len());
+    for (slot, index) in slots.iter().zip(1..) {
+        ensure!(slot.len() <= SLOT, "{} bytes do not fit into a slot of {SLOT}", slot.len());
         image.extend(slot);
         // As erased flash.
-        image.resize(end, 0xff);
+        image.resize(index * SLOT, 0xff);
     }
     let mut segment = segments[index];
     segment.p_offset.set(endian, u32::try_from(elf.len())?);

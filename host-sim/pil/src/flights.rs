@@ -3,6 +3,10 @@
 //! *in* plans; *out* the records of both and what the microcontroller measured; *never* a comparison of anything but bits.
 
 use impromptu_firmware::model::Model;
+use impromptu_flight::{
+    learning::{FlightLearning, Guess, POSITION_AGE_S},
+    link::Reason,
+};
 use impromptu_sim::{
     flights::Loop,
     rollout::{FlightPlan, FlightRecord, fly_on},
@@ -39,6 +43,14 @@ pub struct PilReport {
     pub cpu_share_1khz: f64,
 }
 
+impl PilReport {
+    /// Of these flights and of later ones of the same firmware, whose figures are those of all.
+    #[must_use]
+    pub fn and(self, later: Self) -> Self {
+        Self { bit_identical: self.bit_identical && later.bit_identical, ticks: self.ticks + later.ticks, ..later }
+    }
+}
+
 /// Flies plans with the software and with the firmware; gives the firmware's records, in the plans' order.
 ///
 /// # Errors
@@ -47,13 +59,56 @@ pub fn fly<L: Line>(
     board: &mut Board<L>,
     closed_loop: &Loop,
     plans: &[FlightPlan<'_>],
+    flown: impl FnMut(usize),
+) -> Result<(Vec<FlightRecord>, PilReport), PilError> {
+    let recorded: Vec<FlightPlan<'_>> = plans.iter().map(recorded).collect();
+    let software = closed_loop.fly(&recorded)?;
+    beside(board, closed_loop, &recorded, software, flown)
+}
+
+/// A learner as the firmware has it before it has learned anything, but that it learns.
+///
+/// # Errors
+/// If the loop's gains are not those of a loop of second order.
+pub fn learner(closed_loop: &Loop) -> Result<FlightLearning, PilError> {
+    let (settings, age_s) = (&closed_loop.settings, POSITION_AGE_S);
+    let guesses = Guess::of(settings, age_s).ok_or(PilError::Refused { command: "to learn", reason: Reason::NoLearner })?;
+    let learning = FlightLearning::new(&guesses, settings.rates.reference_hz(), age_s);
+    learning.ok_or(PilError::Refused { command: "to learn", reason: Reason::NoLearner })
+}
+
+/// As [`fly`], but both learn, from one flight to the next: the software as [`learner`] gives it or as it was recalled, the
+/// firmware as it was told.
+///
+/// # Errors
+/// As [`fly`].
+pub fn fly_learning<L: Line>(
+    board: &mut Board<L>,
+    closed_loop: &Loop,
+    plans: &[FlightPlan<'_>],
+    learning: &mut FlightLearning,
+    flown: impl FnMut(usize),
+) -> Result<(Vec<FlightRecord>, PilReport), PilError> {
+    let recorded: Vec<FlightPlan<'_>> = plans.iter().map(recorded).collect();
+    let software = recorded.iter().map(|plan| closed_loop.fly_learning(plan, learning)).collect::<Result<_, _>>()?;
+    beside(board, closed_loop, &recorded, software, flown)
+}
+
+fn recorded<'a>(plan: &FlightPlan<'a>) -> FlightPlan<'a> {
+    FlightPlan { record: true, ..plan.clone() }
+}
+
+/// Flies recorded plans with the firmware, beside what the software flew.
+fn beside<L: Line>(
+    board: &mut Board<L>,
+    closed_loop: &Loop,
+    plans: &[FlightPlan<'_>],
+    mut software: Vec<FlightRecord>,
     mut flown: impl FnMut(usize),
 ) -> Result<(Vec<FlightRecord>, PilReport), PilError> {
-    let recorded: Vec<FlightPlan<'_>> = plans.iter().map(|plan| FlightPlan { record: true, ..plan.clone() }).collect();
-    let mut software = closed_loop.fly(&recorded)?;
     let mut records = Vec::with_capacity(plans.len());
     let (mut bit_identical, mut ticks, mut inference_hz) = (true, 0, 0.0f64);
-    for (index, (plan, software)) in recorded.iter().zip(&mut software).enumerate() {
+    for (index, (plan, software)) in plans.iter().zip(&mut software).enumerate() {
         if let Some((model, lanes)) = plan.model
             && lanes.network
         {

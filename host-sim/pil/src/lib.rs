@@ -14,8 +14,9 @@
 //! | 2 | `lockstep`, `serial`, `faults` | lines through FIFOs, a socket, or with faults |
 //! | 2 | `board` | the microcontroller as a flight stack |
 //! | 3 | `connection`, `upload` | kinds of link, and what each needs of the system; a model over the link |
+//! | 3 | `learning` | what a vehicle that learns is told, and tells |
 //! | 3 | `flights` | flights beside the software's |
-//! | 4 | `emulated` | the emulated board with a model in its flash |
+//! | 4 | `emulated` | the emulated board with a model, and what was learned, in its flash |
 
 mod board;
 mod connection;
@@ -25,6 +26,7 @@ mod error;
 mod faults;
 mod flash;
 mod flights;
+mod learning;
 mod line;
 #[cfg(unix)]
 mod lockstep;
@@ -34,8 +36,8 @@ mod upload;
 
 pub use board::{Board, Figures};
 pub use connection::LinkKind;
-pub use emulated::{Emulated, connect, firmware, restart, start};
+pub use emulated::{Emulated, connect, firmware, restart, start, start_recalling};
 pub use error::PilError;
 pub use faults::{Faults, Faulty};
-pub use flights::{CYCLES_PER_INSTRUCTION, PilReport, fly};
+pub use flights::{CYCLES_PER_INSTRUCTION, PilReport, fly, fly_learning, learner};
 pub use line::Line;

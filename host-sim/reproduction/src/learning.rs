@@ -6,6 +6,7 @@
 //! of Widrow and Walach 1996 (filtered-x) and Pereida, Helwa, Schoellig 2018 (a learned map that corrects references).
 
 mod cases;
+mod machines;
 mod report;
 mod row;
 mod seconds;
@@ -27,6 +28,7 @@ use rayon::prelude::*;
 
 use crate::robustness::draw::Ranges;
 pub use cases::{Case, Start, cases};
+pub use machines::Machine;
 pub use row::Row;
 pub use seconds::Seconds;
 
@@ -46,7 +48,7 @@ pub struct Settings {
 /// Rows of the study, and the study that shows them.
 #[derive(Clone, Debug)]
 pub struct Found {
-    /// One row for each case.
+    /// One row for each case, then one for each machine.
     pub rows: Vec<Row>,
     /// The same for people.
     pub study: Study,
@@ -60,9 +62,15 @@ pub fn run(settings: &Settings, command: &str, observer: &dyn Observer) -> anyho
     let all: Vec<Case> = cases().into_iter().filter(|case| settings.models || case.start == Start::Nothing).collect();
     let models = models(settings, &all, observer)?;
     observer.stage(&format!("{} rows of {} strokes", all.len(), settings.strokes));
-    let rows = all.par_iter().map(|case| fly(settings, case, &models)).collect::<anyhow::Result<Vec<Row>>>()?;
+    let mut rows = all.par_iter().map(|case| fly(settings, case, &models)).collect::<anyhow::Result<Vec<Row>>>()?;
     let mut study = Study::new("Learning in flight", command, settings.seed);
     report::tell(&mut study, settings, &all, &rows);
+    for machine in Machine::ALL {
+        let flown = machines::learned(machine, settings.strokes, derived(settings.seed, Purpose::Test))?;
+        let row = Row::of_machine(machine, settings.seed, &flown);
+        report::tell_machine(&mut study, machine, &row);
+        rows.push(row);
+    }
     observer.stage("the first minute");
     study.figures.extend(first_minutes(settings)?);
     Ok(Found { rows, study })
@@ -119,7 +127,7 @@ fn fly(settings: &Settings, case: &Case, models: &BTreeMap<String, Vec<u8>>) -> 
     let teach = teaching(seed, motion_s, case.speed, rate)?;
     let fly = |closed_loop: &Loop, test: &[Trajectory], seed: u64| {
         let model = model.as_ref().map(|model| (model, Lanes::BOTH));
-        let learned = LearningLoop { closed_loop, model, parts: case.parts, guessed: case.guessed, seed };
+        let learned = LearningLoop { closed_loop, model, parts: case.parts, response: case.response, seed };
         match case.seconds {
             Seconds::FromFirstStroke => one_after_another(&learned, test, case.then_later_s),
             Seconds::After(seconds) => after(&learned, seconds, &teach, test),

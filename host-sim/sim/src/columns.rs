@@ -38,6 +38,18 @@ pub enum TableError {
         /// What to do.
         advice: &'static str,
     },
+    /// A row has more or fewer cells than the header.
+    #[error("{file}, line {line}: {found} columns, the header has {expected}; drop or repair the row")]
+    Ragged {
+        /// The file.
+        file: String,
+        /// The line, from 1.
+        line: u64,
+        /// Cells of the row.
+        found: usize,
+        /// Cells of the header.
+        expected: usize,
+    },
     /// A cell is not a finite number, or none that the quantity can have.
     #[error("{file}, line {line}: `{column}` is `{found}`, {why}; drop or repair the row")]
     Cell {
@@ -62,10 +74,13 @@ pub struct Table<R> {
     file: String,
     header: csv::StringRecord,
     reader: csv::Reader<R>,
+    /// Whether a last row with too few cells is left out, and the line of it, if it was.
+    forgiving: bool,
+    cut: Option<u64>,
 }
 
 /// Largest magnitude of a number in a table, in any unit: squares and sums of what is larger leave the numbers.
-const LARGEST: f64 = 1e30;
+pub const LARGEST: f64 = 1e30;
 
 impl Table<Bounded> {
     /// Opens a regular file of at most [`reading::TABLE`] bytes.
@@ -87,9 +102,20 @@ impl<R: io::Read> Table<R> {
     /// # Errors
     /// If the header cannot be read.
     pub fn new(reader: R, file: &str) -> Result<Self, TableError> {
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(reader);
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(reader);
         let header = reader.headers().map_err(|source| TableError::Csv { file: file.into(), source })?.clone();
-        Ok(Self { file: file.into(), header, reader })
+        Ok(Self { file: file.into(), header, reader, forgiving: false, cut: None })
+    }
+
+    /// A last row with too few cells, as a logger leaves whose battery was pulled, is left out ([`Table::cut`]).
+    #[must_use]
+    pub fn forgiving(self) -> Self {
+        Self { forgiving: true, ..self }
+    }
+
+    /// Line of the last row, if that was left out, once the rows have been read.
+    pub fn cut(&self) -> Option<u64> {
+        self.cut
     }
 
     /// Name in messages.
@@ -116,11 +142,24 @@ impl<R: io::Read> Table<R> {
 
     /// The rows, one after another; blank lines are none.
     pub fn rows(&mut self) -> impl Iterator<Item = Result<Row<'_>, TableError>> {
-        let Self { file, header, reader } = self;
-        let (file, header) = (file.as_str(), &*header);
-        reader.records().map(move |record| {
-            let record = record.map_err(|source| TableError::Csv { file: file.into(), source })?;
-            Ok(Row { file, header, record })
+        let Self { file, header, reader, forgiving, cut } = self;
+        let (file, header, forgiving) = (file.as_str(), &*header, *forgiving);
+        let mut records = reader.records().peekable();
+        std::iter::from_fn(move || {
+            let record = match records.next()? {
+                Ok(record) => record,
+                Err(source) => return Some(Err(TableError::Csv { file: file.into(), source })),
+            };
+            let (found, expected) = (record.len(), header.len());
+            let line = record.position().map_or(0, csv::Position::line);
+            if found == expected {
+                return Some(Ok(Row { file, header, record }));
+            }
+            if forgiving && found < expected && records.peek().is_none() {
+                *cut = Some(line);
+                return None;
+            }
+            Some(Err(TableError::Ragged { file: file.into(), line, found, expected }))
         })
     }
 }
@@ -144,6 +183,19 @@ impl Row<'_> {
     /// If it is none.
     pub fn number(&self, place: usize) -> Result<f64, TableError> {
         self.within(place, LARGEST)
+    }
+
+    /// The text at the place of a column.
+    pub fn text(&self, place: usize) -> &str {
+        self.record.get(place).unwrap_or_default()
+    }
+
+    /// The number at the place of a column, whose magnitude is at most `largest`; `None` if the cell is empty.
+    ///
+    /// # Errors
+    /// If there is something else, or it is larger.
+    pub fn optional(&self, place: usize, largest: f64) -> Result<Option<f64>, TableError> {
+        if self.record.get(place).is_none_or(str::is_empty) { Ok(None) } else { self.within(place, largest).map(Some) }
     }
 
     /// The number at the place of a column, whose magnitude is at most `largest`.
@@ -198,6 +250,19 @@ mod tests {
         assert_eq!(pairs("b,a\n").unwrap(), []);
     }
 
+    /// The last row alone, and only if it is asked for.
+    #[test]
+    fn a_last_row_that_was_cut_short_costs_that_row() {
+        let read = |text: &str| {
+            let mut table = Table::new(text.as_bytes(), "t.csv")?.forgiving();
+            let rows = table.rows().map(|row| row?.numbers([0, 1])).collect::<Result<Vec<_>, _>>()?;
+            Ok::<_, TableError>((rows, table.cut()))
+        };
+        assert_eq!(read("a,b\n1,2\n3\n").unwrap(), (vec![[1.0, 2.0]], Some(3)));
+        assert_eq!(read("a,b\n1,2\n3,4").unwrap(), (vec![[1.0, 2.0], [3.0, 4.0]], None));
+        assert!(read("a,b\n1\n3,4\n").is_err() && read("a,b\n1,2\n3,4,5\n").is_err());
+    }
+
     #[test]
     fn a_refusal_names_file_line_and_column_and_says_what_to_do() {
         let refusal = |text: &str| pairs(text).expect_err("refused").to_string();
@@ -210,8 +275,8 @@ mod tests {
             let why = format!("t.csv, line 2: `b` is `{cell}`, not a number from -1e30 to 1e30; drop or repair the row");
             assert_eq!(refusal(&format!("a,b\n1,{cell}\n")), why);
         }
-        let ragged = refusal("a,b\n1,2\n3\n");
-        assert!(ragged.starts_with("t.csv: ") && ragged.contains("line: 3"), "{ragged}");
+        let ragged = "t.csv, line 3: 1 columns, the header has 2; drop or repair the row";
+        assert_eq!(refusal("a,b\n1,2\n3\n"), ragged);
         let wide = refusal(&format!("{}\n", (0..20).map(|index| format!("c{index}")).collect::<Vec<_>>().join(",")));
         assert!(wide.contains("c11, …)") && !wide.contains("c12"), "{wide}");
         let absent = Table::open(Path::new("no/such.csv")).err().expect("absent").to_string();

@@ -27,6 +27,15 @@ pub enum FlightsError {
     Rollout(#[from] RolloutError),
 }
 
+/// How the response is known that a loop has.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Response {
+    /// It is measured in hover, before anything is learned.
+    Commissioned,
+    /// It is guessed from the gains.
+    Guessed(Guessed),
+}
+
 /// How the response that a loop is guessed to have differs from what its gains say.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Guessed {

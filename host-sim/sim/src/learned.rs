@@ -3,22 +3,29 @@
 //! *in* a loop, a model or none, trajectories; *out* their errors beside the baseline's of the same seeds; *never* a baseline
 //! that flew another vehicle or another air; *source* ours ([`impromptu_flight::learning`]).
 
-use impromptu_firmware::{adapter::Lanes, learning::Parts, model::Model};
+use impromptu_firmware::{
+    adapter::Lanes,
+    learning::{Parts, Phase, Problem, Progress},
+    model::Model,
+};
 use impromptu_flight::learning::FlightLearning;
 #[cfg(feature = "threads")]
 use rayon::prelude::*;
 
 use crate::{
     flight_log::{FlightLog, LogRow},
-    flights::{Guessed, Loop, reduction},
+    flights::{Guessed, Loop, Response, reduction},
     rollout::{FlightPlan, RolloutError},
-    trajectory::{Trajectory, TrajectoryError, stroke},
+    trajectory::{Trajectory, TrajectoryError, hover, stroke},
 };
 
 /// Strokes that are not judged where they are flown one after another.
 const FIRST: usize = 4;
 /// Between the seeds of the flights that teach and those that are judged.
 const OTHER_SEEDS: u64 = 1 << 32;
+/// Hover in which responses are measured, s: rest, steps and fit take fifteen of it, twice as much of a
+/// slow loop.
+const HOVER_S: f64 = 32.0;
 /// The same of strokes.
 const OTHER_STROKES: u64 = 0x7ea_c413;
 
@@ -31,8 +38,8 @@ pub struct LearningLoop<'a> {
     pub model: Option<(&'a Model<'a>, Lanes)>,
     /// Parts that learn and act.
     pub parts: Parts,
-    /// What is known of the response.
-    pub guessed: Guessed,
+    /// How the response is known.
+    pub response: Response,
     /// Of the first flight; each has its own.
     pub seed: u64,
 }
@@ -67,8 +74,15 @@ impl Flown {
 
 impl<'a> LearningLoop<'a> {
     fn nothing(&self) -> Result<FlightLearning, RolloutError> {
-        let mut learning = self.closed_loop.learning(&self.guessed)?;
-        learning.switch(self.parts, self.parts);
+        let guessed = match self.response {
+            Response::Guessed(guessed) => guessed,
+            Response::Commissioned => Guessed::RIGHT,
+        };
+        let mut learning = self.closed_loop.learning(&guessed)?;
+        if self.response == Response::Commissioned {
+            commission(self.closed_loop, &mut learning, self.seed)?;
+        }
+        learning.add_on().switch(self.parts, self.parts);
         Ok(learning)
     }
 
@@ -81,6 +95,29 @@ impl<'a> LearningLoop<'a> {
     ) -> Result<f64, RolloutError> {
         let plan = FlightPlan { model: self.model, guard: closed_loop.guard, ..FlightPlan::new(trajectory, seed) };
         Ok(closed_loop.fly_learning(&plan, learning)?.rms)
+    }
+}
+
+/// The hover in which responses are measured.
+///
+/// # Errors
+/// If the rate is none.
+pub fn commissioning(rate_hz: f64) -> Result<Trajectory, TrajectoryError> {
+    hover(HOVER_S).sampled(rate_hz)
+}
+
+/// Hovers until the responses are measured, after which it learns; `None`, or why they were not: then it learns with the guess. A
+/// model does not correct meanwhile: its feedback lane would take the steps for a disturbance.
+///
+/// # Errors
+/// If it cannot be flown.
+pub fn commission(closed_loop: &Loop, learning: &mut FlightLearning, seed: u64) -> Result<Option<Problem>, RolloutError> {
+    let hover = commissioning(closed_loop.rate_hz()).map_err(|error| RolloutError::Commission(error.to_string()))?;
+    learning.add_on().commission();
+    closed_loop.fly_learning(&FlightPlan::new(&hover, seed ^ OTHER_SEEDS), learning)?;
+    match learning.progress() {
+        Progress { phase: Phase::Learning, problem, .. } => Ok(problem),
+        Progress { commissioned, .. } => Err(RolloutError::Commission(format!("{:.0} % done", 100.0 * commissioned))),
     }
 }
 
@@ -115,7 +152,7 @@ pub fn one_after_another(learned: &LearningLoop<'_>, strokes: &[Trajectory], lat
         errors: errors.split_off(judged),
         first,
         seconds: flown,
-        forgotten: learning.forgotten().into(),
+        forgotten: learning.progress().forgotten.into(),
     })
 }
 
@@ -182,7 +219,7 @@ fn each(
     let fly = |(index, stroke): (usize, &Trajectory)| {
         let mut own = learning.clone();
         let error = learned.fly(closed_loop, stroke, learned.seed.wrapping_add(index as u64), &mut own)?;
-        Ok((error, u32::from(own.forgotten() - learning.forgotten())))
+        Ok((error, u32::from(own.progress().forgotten - learning.progress().forgotten)))
     };
     #[cfg(feature = "threads")]
     let strokes = strokes.par_iter();
@@ -205,6 +242,7 @@ pub fn second_by_second(
 ) -> Result<[Vec<(f64, f64)>; 2], RolloutError> {
     let fly = |strokes: &Vec<Trajectory>| {
         let mut learning = closed_loop.learning(&Guessed::RIGHT)?;
+        commission(closed_loop, &mut learning, seed)?;
         let mut squares = [Vec::new(), Vec::new()];
         for (stroke, seed) in strokes.iter().zip(seed..) {
             let plan = FlightPlan { log: true, ..FlightPlan::new(stroke, seed) };

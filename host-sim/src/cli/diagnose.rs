@@ -27,6 +27,7 @@ use serde::Serialize;
 
 use super::{
     Invocation,
+    log_reading::{LogReading, say},
     situation::{closed_loop, hertz, milliseconds},
 };
 
@@ -79,6 +80,8 @@ pub(super) struct Diagnose {
     /// Rate of the add-on, Hz: that of which the relative degree is meant; chosen from the band of the log if not given.
     #[arg(long, value_name = "HZ", value_parser = hertz)]
     sub_rate: Option<f64>,
+    #[command(flatten)]
+    reading: LogReading,
 }
 
 /// Names of three columns.
@@ -148,7 +151,7 @@ impl Diagnose {
                 )?;
                 let age_s = self.delay_ms.map_or(closed_loop.condition.measurement_delay_s, |delay| delay / 1e3);
                 let axis = |(index, axis): (usize, &&str)| {
-                    Ok(Channel { name: (*axis).to_owned(), unit: "m", record: of_logs(&logs, index, age_s)? })
+                    Ok(Channel { name: (*axis).to_owned(), unit: "m", record: of_logs(&logs, index, age_s)?, notes: Vec::new() })
                 };
                 (source, AXES.iter().enumerate().map(axis).collect::<Result<Vec<_>, DiagnosisError>>()?)
             }
@@ -159,7 +162,7 @@ impl Diagnose {
         };
         let wanted = |channel: &Channel| self.axis.is_empty() || self.axis.contains(&channel.name);
         let mut diagnosed = Diagnosed { seed, source, channels: Vec::new(), refused: Vec::new() };
-        for Channel { name, unit, record } in channels.into_iter().filter(wanted) {
+        for Channel { name, unit, record, .. } in channels.into_iter().filter(wanted) {
             match diagnose(&record, &settings) {
                 Ok(diagnosis) => {
                     diagnosed.channels.push(Found { name, unit, verdict: diagnosis.verdict_text(), diagnosis });
@@ -180,8 +183,13 @@ impl Diagnose {
     fn channels(&self, invocation: &Invocation) -> Result<(usize, Vec<Channel>)> {
         let age_s = self.delay_ms.unwrap_or(0.0) / 1e3;
         let columns = self.columns.as_ref().map(|columns| &columns.0);
-        let of_file = |path: &PathBuf| Ok((path.display().to_string(), read(path, columns, age_s).context("--log")?));
+        let of_file = |path: &PathBuf| {
+            Ok((path.display().to_string(), read(path, columns, age_s, &self.reading.reading()).context("--log")?))
+        };
         let files = self.log.iter().map(of_file).collect::<Result<Vec<_>>>()?;
+        for (path, channels) in &files {
+            say(invocation, path, channels.iter().flat_map(|channel| &channel.notes));
+        }
         let errors: Vec<f64> = files.iter().map(|(_, channels)| largest_error(channels)).collect();
         let bound = largest_sound_error(&errors);
         let (mut kept, mut joined): (usize, Vec<Channel>) = (0, Vec::new());

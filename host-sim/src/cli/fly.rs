@@ -14,11 +14,12 @@ use impromptu_firmware::{
     guard::{Trip, Trips},
     learning::Parts,
 };
+use impromptu_flight::learning::KEPT;
 use impromptu_pil::LinkKind;
 use impromptu_report::{Method, PerFlight};
 use impromptu_sim::{
     controller::Controller,
-    flights::Guessed,
+    flights::{Guessed, Response},
     learned::{LearningLoop, taught, teaching},
     rollout::{FlightPlan, FlightRecord},
     trajectory::strokes,
@@ -28,9 +29,10 @@ use serde::Serialize;
 
 use super::{
     Invocation,
+    learned_file::{keep, kept},
     model_file::{ModelFile, method},
     output::{number, table},
-    processor::Flights,
+    processor::{Flights, Learn},
     situation::{Situation, learning, milliseconds, speed},
     trajectory,
 };
@@ -46,8 +48,10 @@ Examples:
   host-sim fly --model models/model.impromptu --trajectory letters:HI --speed 1.7 --log hi.csv
   host-sim fly --model models/model.impromptu --trajectory own.csv --condition rough --extra-delay-ms 20 --lanes network
   host-sim fly --trajectory figure8 --controller pid
-  host-sim fly --trajectory figure8 --learn 60 --controller pid
-  host-sim fly --pil --model models/model.impromptu")]
+  host-sim fly --trajectory figure8 --learn 60 --controller pid --keep pid.learned
+  host-sim fly --trajectory star --learn --controller pid --recall pid.learned
+  host-sim fly --pil --model models/model.impromptu
+  host-sim fly --pil --learn --strokes 10 --keep own.learned")]
 pub(super) struct Fly {
     /// Model file; without it the baseline flies alone.
     #[arg(long, value_name = "FILE")]
@@ -66,10 +70,17 @@ pub(super) struct Fly {
     /// Lanes of the model that are on.
     #[arg(long, value_enum, default_value_t, requires = "model")]
     lanes: LaneChoice,
-    /// Learns in flight, from nothing or on top of the model: from SECONDS of motion of other strokes, and on the way.
-    #[arg(long, value_name = "SECONDS", num_args = 0..=1, default_missing_value = "0", conflicts_with = "pil")]
+    /// Learns in flight, from nothing or on top of the model: from SECONDS of motion of other strokes, and on the way. With --pil
+    /// and no SECONDS: on the microcontroller, from each stroke for the next ones.
+    #[arg(long, value_name = "SECONDS", num_args = 0..=1, default_missing_value = "0")]
     #[arg(value_parser = learning)]
     learn: Option<u32>,
+    /// With --learn: file for what was learned, of the loop and beside the model that were flown.
+    #[arg(long, value_name = "OUT", requires = "learn")]
+    keep: Option<PathBuf>,
+    /// With --learn and no SECONDS: goes on with what --keep wrote, responses included.
+    #[arg(long, value_name = "FILE", requires = "learn")]
+    recall: Option<PathBuf>,
     /// Flies through the firmware on the emulated microcontroller, which it builds.
     #[arg(long)]
     pil: bool,
@@ -142,6 +153,12 @@ impl Fly {
     /// Why the arguments do not go together, if they do not.
     pub(super) fn conflict(&self) -> Option<String> {
         let controller = self.situation.controller;
+        if self.recall.is_some() && self.learn.is_some_and(|seconds| seconds > 0) {
+            return Some("--recall: it goes on with what was kept; leave out the SECONDS of --learn".into());
+        }
+        if self.pil && self.learn.is_some_and(|seconds| seconds > 0) {
+            return Some("--pil: it learns from each stroke for the next ones; leave out the SECONDS of --learn".into());
+        }
         let elsewhere = self.pil && controller != Controller::Se3;
         let reason = || format!("--pil: the firmware flies its own loop, se3; leave out --controller {}", controller.name());
         elsewhere.then(reason).or_else(|| self.situation.conflict())
@@ -151,6 +168,10 @@ impl Fly {
         if let Some(log) = &self.log {
             let inputs = self.model.as_deref().into_iter().chain(self.trajectory.as_deref().map(Path::new));
             invocation.check_output(log, inputs.chain(self.situation.files()))?;
+        }
+        if let Some(keep) = &self.keep {
+            let inputs = self.model.as_deref().into_iter().chain(self.log.as_deref());
+            invocation.check_output(keep, inputs.chain(self.situation.files()))?;
         }
         let closed_loop = self.situation.closed_loop()?.delayed(self.extra_delay_ms / 1e3);
         let trajectory = match &self.trajectory {
@@ -178,9 +199,15 @@ impl Fly {
                 strokes(invocation.configuration.seed_of(Purpose::Test), self.strokes as usize, self.speed, closed_loop.rate_hz())
             };
             let trajectories = trajectory.map_or_else(strokes, |trajectory| Ok(vec![trajectory]))?;
-            let (speed, lanes, link) = (self.speed, self.lanes.lanes(), self.link);
-            let flights =
-                Flights { closed_loop: &closed_loop, trajectories: &trajectories, speed, file: file.as_ref(), lanes, link };
+            let flights = Flights {
+                closed_loop: &closed_loop,
+                trajectories: &trajectories,
+                speed: self.speed,
+                file: file.as_ref(),
+                lanes: self.lanes.lanes(),
+                link: self.link,
+                learn: self.learn.map(|_| Learn { keep: self.keep.as_deref(), recall: self.recall.as_deref() }),
+            };
             return flights.run(invocation);
         }
         let Some(trajectory) = trajectory else { bail!("--trajectory is missing") };
@@ -199,12 +226,29 @@ impl Fly {
             closed_loop.fly(&plans).with_context(|| file.as_ref().map_or_else(|| trajectory.name.clone(), ModelFile::name))?;
         if let Some(seconds) = self.learn {
             let model = model.as_ref().map(|model| (model, self.lanes.lanes()));
-            let learned =
-                LearningLoop { closed_loop: &closed_loop, model, parts: Parts::BOTH, guessed: Guessed::RIGHT, seed: flight_seed };
-            let teach = teaching(flight_seed, seconds, self.speed, closed_loop.rate_hz())?;
-            let (mut learning, _) = taught(&learned, seconds, &teach)?;
+            let learned = LearningLoop {
+                closed_loop: &closed_loop,
+                model,
+                parts: Parts::BOTH,
+                response: Response::Commissioned,
+                seed: flight_seed,
+            };
+            let checksum = model.map(|(model, _)| model.checksum());
+            let mut learning = match &self.recall {
+                Some(path) => {
+                    let mut learning = closed_loop.learning(&Guessed::RIGHT)?;
+                    learning.recall(checksum, &kept(path)?).with_context(|| path.display().to_string())?;
+                    learning
+                }
+                None => taught(&learned, seconds, &teaching(flight_seed, seconds, self.speed, closed_loop.rate_hz())?)?.0,
+            };
             let plan = FlightPlan { model, log: true, ..FlightPlan::new(&trajectory, flight_seed) };
             records.push(closed_loop.fly_learning(&plan, &mut learning)?);
+            if let Some(path) = &self.keep {
+                let mut bytes = [0; KEPT];
+                let kept = learning.keep(checksum, &mut bytes).context("--keep: no response is known")?;
+                keep(path, kept, invocation)?;
+            }
             methods.push(if model.is_some() { Method::FullLearned } else { Method::Learned });
         }
         if let Some(path) = &self.log {

@@ -10,16 +10,18 @@ use impromptu_experiment::{
     replay::{Flight, Replay},
     second_order::Known,
 };
+use impromptu_files::replacement::replace;
 use impromptu_report::{render_study, write_page};
 use impromptu_training::{
     channel::{AXES, largest_distance},
     largest_sound_error,
     observer::Observer as _,
-    track::{Columns, TrackError, tracks},
+    track::{Columns, tracks},
 };
 
 use super::{
     Invocation,
+    log_reading::{LogReading, say},
     situation::{milliseconds, within},
 };
 
@@ -46,7 +48,8 @@ The learner runs at the log's rate, or at a multiple or part of it, so that the 
 between rows are interpolated linearly, so that such a tick knows a share of the row to come. What of the response is not given is
 found from the first two logs. One response stands for all axes; if it misses the logs by much, the prediction is worth little.
 
-Written into --out: learn.html, a page with a figure in which the predicted error melts flight after flight.
+Written into --out: learn.html, a page with a figure in which the predicted error melts flight after flight; learn.learned, what
+was learned of all of them, for a learner of the same axes (`model-export inspect learn.learned`).
 
 Examples:
   host-sim learn --log monday.csv tuesday.csv wednesday.csv
@@ -74,6 +77,8 @@ pub(super) struct Learn {
     /// Its delay, ms [default: found from the first two logs].
     #[arg(long, value_name = "N", value_parser = milliseconds)]
     delay_ms: Option<f64>,
+    #[command(flatten)]
+    reading: LogReading,
 }
 
 fn named(text: &str) -> Result<Columns, String> {
@@ -103,15 +108,13 @@ fn damping(text: &str) -> Result<f64, String> {
     within(text, 0.05, 5.0)
 }
 
-/// Whether the arguments leave open which columns are meant.
-pub(super) fn leaves_open(error: &anyhow::Error) -> bool {
-    matches!(error.downcast_ref(), Some(TrackError::Ambiguous { .. }))
-}
-
 impl Learn {
     pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
-        let page = invocation.configuration.folder()?.join("learn.html");
-        invocation.check_output(&page, self.log.iter().map(PathBuf::as_path))?;
+        let folder = invocation.configuration.folder()?;
+        let [page, state] = ["learn.html", "learn.learned"].map(|name| folder.join(name));
+        for output in [&page, &state] {
+            invocation.check_output(output, self.log.iter().map(PathBuf::as_path))?;
+        }
         let flights = self.flights(invocation)?;
         invocation.console.stage("replaying");
         let known = Known {
@@ -121,19 +124,23 @@ impl Learn {
             delay_s: self.delay_ms.map(|delay| delay / 1e3),
         };
         let replay = Replay::of(&flights, &known).context("--log")?;
+        let learned = replay.learned.clone();
         let replayed = report::Replayed::new(replay, &flights);
         invocation.console.finish();
         let study = replayed.study(invocation.configuration.seed(), &invocation.command);
         write_page(&render_study(&study)?, &page)?;
-        invocation.console.note(&format!("figure: {}", page.display()));
+        replace(&state, &learned).with_context(|| state.display().to_string())?;
+        invocation.console.note(&format!("figure: {}\nlearned: {}", page.display(), state.display()));
         invocation.format.print(&replayed, || replayed.text())
     }
 
     /// The flights; those in which the loop broke down are left out, as `train` and `diagnose` do.
     fn flights(&self, invocation: &Invocation) -> Result<Vec<Flight>> {
         let read = |path: &PathBuf| {
-            let tracks = tracks(path, &self.columns, &self.axis).context("--log")?;
-            Ok(Flight { name: name(path), tracks })
+            let tracks = tracks(path, &self.columns, &self.axis, &self.reading.reading()).context("--log")?;
+            let name = name(path);
+            say(invocation, &name, tracks.iter().flat_map(|track| &track.notes));
+            Ok(Flight { name, tracks })
         };
         let mut flights = self.log.iter().map(read).collect::<Result<Vec<_>>>()?;
         let error = |flight: &Flight| {

@@ -10,6 +10,8 @@ mod diagnose;
 mod evaluate;
 mod fly;
 mod learn;
+mod learned_file;
+mod log_reading;
 mod model_file;
 mod output;
 mod processor;
@@ -54,6 +56,7 @@ Examples:
   host-sim diagnose --log logs/*.csv
   host-sim learn --log monday.csv tuesday.csv wednesday.csv
   host-sim train --log logs/*.csv --dithered dithered/*.csv --vehicle crazyflie --out models
+  host-sim train --learned own.learned --vehicle crazyflie --name flown --out models
   host-sim fly --model models/model.impromptu --trajectory figure8 --log figure8.csv
   host-sim evaluate --model models/model.impromptu --speed 1,1.7
   host-sim report out/results.json --out again";
@@ -176,7 +179,7 @@ where
         Err(error) => {
             // Nothing can be done if even that cannot be written.
             let _ = writeln!(std::io::stderr(), "error: {}", line(&message(&error)));
-            ExitCode::from(if learn::leaves_open(&error) { WRONG_ARGUMENTS } else { FAILED })
+            ExitCode::from(if log_reading::leaves_open(&error) { WRONG_ARGUMENTS } else { FAILED })
         }
     }
 }

@@ -10,14 +10,16 @@ use impromptu_files::name::plain;
 use impromptu_flight::flight::Rates;
 use impromptu_sim::{controller::Controller, flight_log::FlightLog, flights::Loop};
 use impromptu_training::{
-    AxisGates, LearnError, LearnSettings, Learned, Pipeline, Recipe, Trained, Validation, check_gates, files::model_files,
-    in_words, learn::few_rows, observer::Observer as _, smoothing, supervised::Progress, write_model_files,
+    AxisGates, LearnError, LearnSettings, Learned, Pipeline, Purpose, Recipe, Trained, Validation, check_gates, derived,
+    dithered_logs, files::model_files, in_words, learn::few_rows, learned_in_flight, observer::Observer as _, smoothing,
+    supervised::Progress, write_model_files,
 };
 use serde::Serialize;
 
 use super::{
     Invocation,
     configuration::checked,
+    learned_file::kept,
     output::table,
     situation::{closed_loop, controller, flown_by, gains_conflict, milliseconds},
 };
@@ -27,8 +29,13 @@ use super::{
 #[command(after_help = columns::HELP)]
 pub(super) struct Train {
     /// Flight logs of the baseline; two at least, every fourth one decides when to stop.
-    #[arg(long, value_name = "FILE.csv", required = true, num_args = 1..)]
+    #[arg(long, value_name = "FILE.csv", required_unless_present = "learned", num_args = 1..)]
     log: Vec<PathBuf>,
+    /// Instead of logs, what was learned in flight without a model (`fly --keep`, or sent by a vehicle): its preview part becomes
+    /// the network, the prior of what is learned next.
+    #[arg(long, value_name = "FILE.learned", requires = "vehicle")]
+    #[arg(conflicts_with_all = ["log", "delay_ms", "smoothing_ms", "force"])]
+    learned: Option<PathBuf>,
     /// Logs with an independent dither on the position reference, for the feedback lane; those of --log if not given.
     #[arg(long, value_name = "FILE.csv", num_args = 1..)]
     dithered: Vec<PathBuf>,
@@ -91,6 +98,18 @@ struct Passed {
     overridden: Option<String>,
 }
 
+/// What was made, and what was said of the logs before.
+struct Made {
+    learned: Learned,
+    trained: Trained,
+    gates: Vec<AxisGates>,
+    overridden: Option<String>,
+}
+
+fn read(paths: &[PathBuf], rate_hz: f64) -> Result<Vec<FlightLog>> {
+    Ok(paths.iter().map(|path| FlightLog::read(path, rate_hz)).collect::<Result<_, _>>()?)
+}
+
 /// The logs' loop: what of it is known.
 struct Origin {
     /// The simulated loop of the validation flights.
@@ -109,30 +128,13 @@ impl Train {
             None => invocation.configuration.recipe().clone(),
         };
         let origin = self.origin(&recipe)?;
-        let rate_hz = f64::from(Rates::default().reference_hz());
-        let read = |paths: &[PathBuf]| paths.iter().map(|path| FlightLog::read(path, rate_hz)).collect::<Result<Vec<_>, _>>();
-        let (logs, dithered) = (read(&self.log)?, read(&self.dithered)?);
-        check_movement(&logs)?;
         invocation.console.note(&format!("seed {seed}"));
-        let gates = self.pass_gates(invocation, &logs, origin.delay_s, seed)?;
         let folder = invocation.configuration.folder()?;
         self.check_outputs(invocation, &folder)?;
-
-        invocation.console.stage(&format!("training on {} logs", logs.len()));
-        let pipeline = origin.pipeline(&recipe, seed, self.force)?;
-        let learned = pipeline.learn(&logs, &mut watched(invocation, &recipe)).map_err(|error| match error {
-            few @ LearnError::FewRows { .. } => anyhow!("--log: {few}; --force trains all the same, and the model says so"),
-            other => anyhow::Error::new(other).context("--log"),
-        })?;
-        invocation.console.finish();
-        for log in &learned.broken {
-            let error = log.largest_error;
-            invocation.console.note(&format!("{}: left out, its loop broke down (largest error {error:.2} m)", log.name));
-        }
-        invocation.console.stage("designing the feedback lane");
-        let overridden = self.overridden(invocation, &recipe, &learned, gates.overridden, rate_hz);
-        let identification = if dithered.is_empty() { &logs } else { &dithered };
-        let trained = pipeline.complete(&learned, identification, &self.name, overridden.as_deref())?;
+        let Made { learned, trained, gates, overridden } = match &self.learned {
+            Some(path) => self.of_flight(path, invocation, &recipe, &origin, seed)?,
+            None => self.of_logs(invocation, &recipe, &origin, seed)?,
+        };
         let Trained { lane, description, model } = trained;
         invocation.console.note(&in_words(&lane));
         let (design, refusal) = match lane {
@@ -143,16 +145,57 @@ impl Train {
         let trained = Summary {
             name: self.name,
             seed,
-            logs: logs.len(),
+            logs: self.log.len(),
             rows: learned.rows.count,
             bytes: model.len(),
             feedback_lane: design,
             refusal,
-            gates: gates.axes,
+            gates,
             overridden,
             files,
         };
         invocation.format.print(&trained, || text(&trained))
+    }
+
+    /// From logs, which pass the gates first.
+    fn of_logs(&self, invocation: &Invocation, recipe: &Recipe, origin: &Origin, seed: u64) -> Result<Made> {
+        let rate_hz = f64::from(Rates::default().reference_hz());
+        let (logs, dithered) = (read(&self.log, rate_hz)?, read(&self.dithered, rate_hz)?);
+        check_movement(&logs)?;
+        let gates = self.pass_gates(invocation, &logs, origin.delay_s, seed)?;
+        invocation.console.stage(&format!("training on {} logs", logs.len()));
+        let pipeline = origin.pipeline(recipe, seed, self.force)?;
+        let learned = pipeline.learn(&logs, &mut watched(invocation, recipe)).map_err(|error| match error {
+            few @ LearnError::FewRows { .. } => anyhow!("--log: {few}; --force trains all the same, and the model says so"),
+            other => anyhow::Error::new(other).context("--log"),
+        })?;
+        invocation.console.finish();
+        for log in &learned.broken {
+            let error = log.largest_error;
+            invocation.console.note(&format!("{}: left out, its loop broke down (largest error {error:.2} m)", log.name));
+        }
+        invocation.console.stage("designing the feedback lane");
+        let overridden = self.overridden(invocation, recipe, &learned, gates.overridden, rate_hz);
+        let identification = if dithered.is_empty() { &logs } else { &dithered };
+        let trained = pipeline.complete(&learned, identification, &self.name, overridden.as_deref())?;
+        Ok(Made { learned, trained, gates: gates.axes, overridden })
+    }
+
+    /// From what was learned in flight, beside the simulated loop.
+    fn of_flight(&self, path: &Path, invocation: &Invocation, recipe: &Recipe, origin: &Origin, seed: u64) -> Result<Made> {
+        let closed_loop = &origin.template;
+        let kept = kept(path)?;
+        let motions = Validation::strokes(recipe, closed_loop, &recipe.validation_speeds, seed)?.trajectories;
+        let (recipe, learned) = learned_in_flight(recipe, &kept, closed_loop.rate_hz(), &motions)
+            .with_context(|| format!("--learned {}", path.display()))?;
+        invocation.console.stage("designing the feedback lane");
+        let dithered = match self.dithered.as_slice() {
+            [] => dithered_logs(&recipe.lane, closed_loop, derived(seed, Purpose::Identification))?,
+            paths => read(paths, closed_loop.rate_hz())?,
+        };
+        let remark = "network: the preview part of what was learned in flight";
+        let trained = origin.pipeline(&recipe, seed, false)?.complete(&learned, &dithered, &self.name, Some(remark))?;
+        Ok(Made { learned, trained, gates: Vec::new(), overridden: None })
     }
 
     /// Why the arguments do not go together, if they do not.
@@ -163,7 +206,7 @@ impl Train {
     /// Every file that is written must be writable, and none of those that are read.
     fn check_outputs(&self, invocation: &Invocation, folder: &Path) -> Result<()> {
         let named = [self.vehicle.as_deref(), Some(&self.condition)].into_iter().flatten().map(Path::new);
-        let read = || self.log.iter().chain(&self.dithered).chain(&self.recipe).map(PathBuf::as_path);
+        let read = || self.log.iter().chain(&self.dithered).chain(&self.learned).chain(&self.recipe).map(PathBuf::as_path);
         for output in model_files(folder, &self.name)? {
             invocation.check_output(&output, read().chain(named.clone()))?;
         }
@@ -279,9 +322,13 @@ fn text(trained: &Summary) -> String {
         (Some(design), _) => design.clone(),
         (None, reason) => format!("none: {}", reason.as_deref().unwrap_or_default()),
     };
+    let source = match trained.logs {
+        0 => "what was learned in flight".to_owned(),
+        logs => format!("{} rows of {logs} logs", trained.rows),
+    };
     let mut rows = vec![
         ["model".to_owned(), format!("{}, {} bytes, seed {}", trained.name, trained.bytes, trained.seed)],
-        ["trained on".to_owned(), format!("{} rows of {} logs", trained.rows, trained.logs)],
+        ["trained on".to_owned(), source],
         ["feedback lane".to_owned(), lane],
     ];
     rows.extend(trained.files.iter().map(|file| ["file".to_owned(), file.display().to_string()]));

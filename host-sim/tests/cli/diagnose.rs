@@ -167,3 +167,54 @@ fn training_refuses_a_gain_that_is_not_one_and_records_that_it_was_forced() {
     let remarks = Model::from_bytes(&bytes).unwrap().card().provenance.remarks.to_owned();
     assert!(remarks.contains("gates overridden by --force") && remarks.contains("axis z"), "{remarks}");
 }
+
+/// Logs as loggers leave them: each is read for what it is, with a note, or refused with the option that settles it.
+#[test]
+fn logs_of_all_kinds_are_read_for_what_they_are() {
+    let folder = Folder::new();
+    let good = log(1.0, 2500);
+    let lag = |arguments: &str| {
+        let run = folder.fine(&format!("diagnose --format json --log {arguments}"));
+        let lag = run.json()["channels"][0]["diagnosis"]["properties"]["lag_s"]["value"].as_f64().unwrap();
+        (lag, run.stderr)
+    };
+    folder.write("good.csv", &good);
+    let (wanted, _) = lag("good.csv");
+    let cells = |of: &dyn Fn(usize, [f64; 3]) -> String| {
+        let rows = good.lines().skip(1).enumerate();
+        rows.fold("time_s,reference,measured\n".to_owned(), |text, (row, line)| {
+            let mut cells = line.split(',').map(|cell| cell.parse::<f64>().unwrap());
+            text + &of(row, std::array::from_fn(|_| cells.next().unwrap())) + "\n"
+        })
+    };
+    // The last row is cut short; rows repeat; wild samples; far from zero.
+    folder.write("cut.csv", good.clone() + "50.0,0.1");
+    folder.write(
+        "twice.csv",
+        cells(&|row, [t, u, y]| if row % 7 == 3 { format!("{t},{u},{y}\n{t},{u},{y}") } else { format!("{t},{u},{y}") }),
+    );
+    folder.write("wild.csv", cells(&|row, [t, u, y]| format!("{t},{u},{}", if row % 900 == 50 { 300.0 } else { y })));
+    folder.write("far.csv", cells(&|_, [t, u, y]| format!("{t},{},{}", u + 1e4, y + 1e4)));
+    for (name, note) in [
+        ("cut.csv", "line 2502, the last one, is cut short"),
+        ("twice.csv", "repeat the one before"),
+        ("wild.csv", "line 52, 952, 1852"),
+        ("far.csv", ""),
+    ] {
+        let (found, said) = lag(name);
+        assert!((found / wanted - 1.0).abs() < 0.02 && said.contains(note), "{name}: {found} {wanted} {said}");
+    }
+    // Time in milliseconds; the other way round; topics that were merged.
+    folder.write("ms.csv", cells(&|_, [t, u, y]| format!("{},{u},{y}", (1e3 * t).round())));
+    folder.write("flipped.csv", cells(&|_, [t, u, y]| format!("{t},{u},{}", -y)));
+    for (name, option) in [("ms.csv", "--time-unit ms"), ("flipped.csv", "--negate-measured")] {
+        let refused = folder.run(&format!("diagnose --log {name}"));
+        let named = option.split(' ').next().unwrap();
+        assert!(refused.code == 2 && refused.stderr.contains(named), "{name}: {}", refused.stderr);
+        let (found, _) = lag(&format!("{name} {option}"));
+        assert!((found / wanted - 1.0).abs() < 0.02, "{name}: {found} {wanted}");
+    }
+    folder.write("merged.csv", cells(&|_, [t, u, y]| format!("{},{u},\n{t},,{y}", t - 0.001)));
+    let (found, said) = lag("merged.csv");
+    assert!((found - wanted).abs() < 0.005 && said.contains("reference was held in 2500 row(s)"), "{found} {wanted} {said}");
+}

@@ -55,7 +55,10 @@ fn the_errors_of_real_flights_would_have_melted() {
     ] {
         assert!(run.stdout.contains(part), "`{part}` is missing in {}", run.stdout);
     }
-    assert!(run.stderr.contains("figure: page"), "{}", run.stderr);
+    assert!(run.stderr.contains("figure: page") && run.stderr.contains("learned: page"), "{}", run.stderr);
+    let learned = folder.read("page/learn.learned");
+    let kept = impromptu_firmware::learning::Kept::read(&learned).unwrap();
+    assert!(kept.rate_hz == 50.0 && kept.axes().all(|axis| axis.learned_s > 60.0), "{kept:?}");
     let page = String::from_utf8(folder.read("page/learn.html")).unwrap();
     assert!(page.contains("nothing was flown") && page.contains("<svg") && page.contains(FLIGHTS[0]), "{page}");
     let given = folder.fine(&format!("learn --log {logs} --axis x --frequency 3 --damping 0.7 --delay-ms 100")).stdout;
@@ -146,6 +149,20 @@ fn fly_and_evaluate_learn_in_flight() {
     let flights = flown["flights"].as_array().unwrap();
     assert_eq!(flights[1]["method"], "learned");
     assert!(flights.len() == 2 && flights[1]["reduction"].as_f64().unwrap() > 80.0, "{flown}");
+    // What was learned goes on after a power cut, for the same loop and model alone.
+    let first = "fly --trajectory star --speed 0.7 --controller pid --format json --learn";
+    folder.fine("fly --trajectory figure8 --learn 20 --controller pid --speed 0.7 --keep pid.learned");
+    let with = |run: String| folder.fine(&run).json()["flights"][1]["reduction"].as_f64().unwrap();
+    let (nothing, recalled) = (with(first.to_owned()), with(format!("{first} --recall pid.learned")));
+    assert!(recalled > nothing + 5.0 && recalled > 85.0, "{nothing} {recalled}");
+    let refused = folder.run(&format!("{first} 10 --recall pid.learned"));
+    assert!(refused.code == 2 && refused.stderr.contains("leave out the SECONDS"), "{}", refused.stderr);
+    let mut damaged = folder.read("pid.learned");
+    damaged[50] ^= 1;
+    folder.write("damaged.learned", &damaged);
+    folder.refused(&format!("{first} --recall damaged.learned"), &["damaged.learned", "learn anew, then keep"]);
+    folder.write("log.csv", b"time\n");
+    folder.refused(&format!("{first} --recall log.csv"), &["log.csv", "nothing was kept here"]);
     // The log is that of the flight that learned.
     assert!(String::from_utf8(folder.read("pid.csv")).unwrap().starts_with("time_s,desired_x_m"));
     let evaluated = folder.fine("evaluate --learn 30 --strokes 4 --speed 1 --format json").json();
@@ -175,7 +192,35 @@ fn the_study_of_learning_has_the_documented_rows() {
         assert!(row["seed"].as_u64() == Some(1) && row["start"] == "nothing", "{row}");
     }
     let loops: std::collections::BTreeSet<&str> = rows.iter().filter_map(|row| row["loop"].as_str()).collect();
-    assert_eq!(loops.into_iter().collect::<Vec<_>>(), ["mellinger", "mellinger_feed_forward", "pid", "se3"]);
+    let expected = ["mellinger", "mellinger_feed_forward", "pd", "pid", "se3", "second_order"];
+    assert_eq!(loops.into_iter().collect::<Vec<_>>(), expected);
+    for machine in ["servo", "two_mass", "non_minimum_phase"] {
+        assert!(rows.iter().any(|row| row["vehicle"] == machine), "{machine}");
+    }
     let page = String::from_utf8(folder.read("out/study-learning.html")).unwrap();
     assert!(page.contains("The error melts") && page.contains("<svg"), "the first figure");
+}
+
+/// A minute of flight becomes a model, beside which learning goes on; what was learned beside a model is only a part of one.
+#[test]
+fn what_was_learned_in_flight_becomes_a_model() {
+    let folder = Folder::new();
+    folder.fine("fly --trajectory figure8 --learn 60 --keep own.learned");
+    let made = folder.fine("train --learned own.learned --vehicle crazyflie --name flown --out models --format json").json();
+    assert!(made["logs"] == 0 && made["feedback_lane"].is_string(), "{made}");
+    let evaluated = folder.fine("evaluate --model models/flown.impromptu --strokes 6 --speed 1 --format json").json();
+    let reduction = |method: &str| {
+        let row = evaluated["table"].as_array().unwrap().iter().find(|row| row["method"] == method);
+        row.unwrap_or_else(|| panic!("no {method} in {evaluated}"))["reduction_mean"].as_f64().unwrap()
+    };
+    assert!(reduction("ridge") > 85.0 && reduction("full_ridge") > 93.0, "{evaluated}");
+    folder.fine("fly --trajectory figure8 --model models/flown.impromptu --learn 10 --keep more.learned");
+    folder.refused("train --learned more.learned --vehicle crazyflie", &["more.learned", "beside another model"]);
+    folder.refused("train --learned models/flown.impromptu --vehicle crazyflie", &["flown.impromptu", "nothing was kept here"]);
+    folder.fine("fly --trajectory figure8 --learn 2 --keep little.learned");
+    folder.refused("train --learned little.learned --vehicle crazyflie", &["little.learned", "in motion", "fly on"]);
+    for wrong in ["train --learned own.learned", "train --learned own.learned --vehicle crazyflie --log log.csv", "train"] {
+        let refused = folder.run(wrong);
+        assert!(refused.code == 2, "{wrong}: {}", refused.stderr);
+    }
 }

@@ -26,6 +26,7 @@ fn unknown_names_are_answered_with_the_known_ones() {
 fn a_loop_is_refused_where_it_cannot_fly() {
     let folder = Folder::new();
     for (words, named) in [
+        ("fly --pil --learn 30", "--pil: it learns from each stroke for the next ones; leave out the SECONDS of --learn"),
         ("fly --pil --controller pid", "--pil: the firmware flies its own loop, se3; leave out --controller pid"),
         ("fly --trajectory circle --controller pid --gains soft", "--gains soft: --controller pid has its own gains"),
         ("train --log a.csv --vehicle crazyflie --controller mellinger --gains soft", "--controller mellinger has its own gains"),

@@ -6,11 +6,16 @@
 
 use std::path::Path;
 
-use impromptu_diagnosis::{Record, RecordError};
+use impromptu_diagnosis::{
+    Record, RecordError,
+    plausibility::{Columns, Implausible, Reading},
+};
 use impromptu_sim::{
-    columns::{Table, TableError},
+    columns::{LARGEST, Table, TableError},
     flight_log::FlightLog,
 };
+
+use crate::gathered::{Places, gathered};
 
 /// A channel by name.
 #[derive(Clone, Debug)]
@@ -21,6 +26,8 @@ pub struct Channel {
     pub unit: &'static str,
     /// Record.
     pub record: Record,
+    /// What was done to the columns of the log before.
+    pub notes: Vec<String>,
 }
 
 /// Why a file holds no channel.
@@ -29,6 +36,14 @@ pub enum ChannelError {
     /// It is no table of numbers with the columns wanted.
     #[error(transparent)]
     Table(#[from] TableError),
+    /// The columns cannot be what they are taken for.
+    #[error("{file}: {source}")]
+    Implausible {
+        /// The file.
+        file: String,
+        /// Why.
+        source: Implausible,
+    },
     /// The columns are no record.
     #[error("{file}: {source}")]
     Record {
@@ -88,8 +103,8 @@ pub fn largest_distance<'a>(axes: impl Iterator<Item = (&'a [f64], &'a [f64])>) 
 ///
 /// # Errors
 /// Names the file, the line and the column of what is wrong.
-pub fn read(path: &Path, columns: Option<&[String; 3]>, age_s: f64) -> Result<Vec<Channel>, ChannelError> {
-    let mut table = Table::open(path)?;
+pub fn read(path: &Path, columns: Option<&[String; 3]>, age_s: f64, reading: &Reading) -> Result<Vec<Channel>, ChannelError> {
+    let table = Table::open(path)?.forgiving();
     let file = table.file().to_owned();
     let has = |column: &str| table.find(column).is_some();
     let names = |time: &str, reference: &str, measured: &str| [time, reference, measured].map(str::to_owned);
@@ -113,23 +128,19 @@ pub fn read(path: &Path, columns: Option<&[String; 3]>, age_s: f64) -> Result<Ve
     let find = |column: &String| table.require(column, ADVICE);
     let places = wanted
         .iter()
-        .map(|(_, _, columns)| Ok([find(&columns[0])?, find(&columns[1])?, find(&columns[2])?]))
-        .collect::<Result<Vec<[usize; 3]>, TableError>>()?;
-    let mut values = vec![[const { Vec::<f64>::new() }; 3]; wanted.len()];
-    for row in table.rows() {
-        let row = row?;
-        for (&places, values) in places.iter().zip(&mut values) {
-            for (value, values) in row.numbers(places)?.into_iter().zip(values) {
-                values.push(value);
-            }
-        }
-    }
-    let in_file = |source| ChannelError::Record { file: file.clone(), source };
+        .map(|(_, _, [time, reference, measured])| {
+            Ok(Places { time: find(time)?, reference: find(reference)?, measured: find(measured)?, rate: None })
+        })
+        .collect::<Result<Vec<Places>, TableError>>()?;
     wanted
         .into_iter()
-        .zip(values)
-        .map(|((name, unit, _), [time, reference, measured])| {
-            Ok(Channel { name, unit, record: fresh(&time, &reference, &measured, age_s).map_err(in_file)? })
+        .zip(gathered(table, &places, LARGEST)?)
+        .map(|((name, unit, columns), gathered)| {
+            let (Columns { time, reference, measured, .. }, notes) = gathered
+                .plausible(&columns[0], reading)
+                .map_err(|source| ChannelError::Implausible { file: file.clone(), source })?;
+            let in_file = |source| ChannelError::Record { file: file.clone(), source };
+            Ok(Channel { name, unit, record: fresh(&time, &reference, &measured, age_s).map_err(in_file)?, notes })
         })
         .collect()
 }

@@ -18,6 +18,7 @@
 //!
 //! | layer | modules | what they hold |
 //! |---|---|---|
+//! | 0 | `gathered` | columns of a log as it is read |
 //! | 1 | `supervised`, `bypass` | rows to networks; inputs past a network |
 //! | 1 | `feedback_design` | identification and design of the feedback lane |
 //! | 1 | `channel`, `breakdown`, `hold_out` | channels of logs; flights that teach nothing; logs that are held out |
@@ -27,6 +28,7 @@
 //! | 2 | `recipe` | everything that decides, as data |
 //! | 3 | `learn` | logs to networks |
 //! | 4 | `error`, `files`, `models` | why there are no models; files written whole; descriptions |
+//! | 4 | `flown` | what was learned in flight as a network |
 //! | 5 | `validation`, `lane_choice` | flights that judge; what comes of the choice of a lane |
 //! | 6 | `lane` | the feedback lane, chosen in flight |
 //! | 7 | `monitor` | what the guard is told of the loop |
@@ -41,7 +43,9 @@ pub mod error;
 pub mod examples;
 pub mod feedback_design;
 pub mod files;
+pub mod flown;
 pub mod gates;
+pub mod gathered;
 pub mod hold_out;
 pub mod lane;
 pub mod lane_choice;
@@ -62,6 +66,7 @@ pub use bypass::Bypass;
 pub use error::BuildError;
 pub use examples::Labels;
 pub use files::{write_log, write_model_files};
+pub use flown::{FlownError, learned_in_flight};
 pub use gates::{AxisGates, check_gates};
 pub use lane::{choose_lane, dithered_logs, lanes, strongest_lane};
 pub use lane_choice::{LaneChoice, LaneRefusal, in_words};

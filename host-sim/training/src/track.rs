@@ -15,10 +15,13 @@
 
 use std::path::Path;
 
-use impromptu_diagnosis::{Record, RecordError};
+use impromptu_diagnosis::{Record, RecordError, plausibility::Reading};
 use impromptu_sim::columns::{Table, TableError};
 
-use crate::channel::{AXES, ChannelError};
+use crate::{
+    channel::{AXES, ChannelError},
+    gathered::{Places, gathered},
+};
 
 /// An axis of a log.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,6 +38,8 @@ pub struct Track {
     pub measured: Vec<f64>,
     /// Its rate of change a second, if the log has it.
     pub rate: Option<Vec<f64>>,
+    /// What was done to the columns of the log before.
+    pub notes: Vec<String>,
 }
 
 /// Columns of a track.
@@ -152,8 +157,8 @@ impl Header<'_> {
 ///
 /// # Errors
 /// Names the file, the line or row and the column of what is wrong, and what to do.
-pub fn tracks(path: &Path, columns: &[Columns], axes: &[String]) -> Result<Vec<Track>, TrackError> {
-    let mut table = Table::open(path)?;
+pub fn tracks(path: &Path, columns: &[Columns], axes: &[String], reading: &Reading) -> Result<Vec<Track>, TrackError> {
+    let table = Table::open(path)?.forgiving();
     let file = table.file().to_owned();
     let wanted = if columns.is_empty() {
         let has = |column: &str| table.find(column).is_some();
@@ -167,30 +172,25 @@ pub fn tracks(path: &Path, columns: &[Columns], axes: &[String]) -> Result<Vec<T
     let places = wanted
         .iter()
         .map(|(_, _, columns)| {
-            let values = [find(&columns.reference)?, find(&columns.measured)?];
-            Ok((find(&columns.time)?, values, columns.rate.as_ref().map(find).transpose()?))
+            let rate = columns.rate.as_ref().map(find).transpose()?;
+            Ok(Places {
+                time: find(&columns.time)?,
+                reference: find(&columns.reference)?,
+                measured: find(&columns.measured)?,
+                rate,
+            })
         })
-        .collect::<Result<Vec<(usize, [usize; 2], Option<usize>)>, TableError>>()?;
-    let mut values = vec![[const { Vec::<f64>::new() }; 4]; wanted.len()];
-    for row in table.rows() {
-        let row = row?;
-        for (&(time, pair, rate), [times, references, measured, rates]) in places.iter().zip(&mut values) {
-            let [reference, position] = row.numbers_within(pair, FARTHEST)?;
-            times.push(row.number(time)?);
-            references.push(reference);
-            measured.push(position);
-            if let Some(rate) = rate {
-                rates.push(row.within(rate, FARTHEST)?);
-            }
-        }
-    }
+        .collect::<Result<Vec<Places>, TableError>>()?;
     let in_file = |source| ChannelError::Record { file: file.clone(), source };
     let mut tracks = Vec::with_capacity(wanted.len());
-    for ((name, unit, columns), [time, reference, measured, rates]) in wanted.into_iter().zip(values) {
-        let (period_s, reference, measured) = uniform(&time, &reference, &measured).map_err(in_file)?;
+    for ((name, unit, columns), gathered) in wanted.into_iter().zip(gathered(table, &places, FARTHEST)?) {
+        let (found, notes) = gathered
+            .plausible(&columns.time, reading)
+            .map_err(|source| ChannelError::Implausible { file: file.clone(), source })?;
+        let (period_s, reference, measured) = uniform(&found.time, &found.reference, &found.measured).map_err(in_file)?;
         // The same rows are filled again: the times are the same.
-        let rate = columns.rate.is_some().then(|| uniform(&time, &rates, &rates).map_err(in_file)).transpose()?;
-        tracks.push(Track { name, unit, period_s, reference, measured, rate: rate.map(|(_, _, rate)| rate) });
+        let rate = found.rate.map(|rates| uniform(&found.time, &rates, &rates).map_err(in_file)).transpose()?;
+        tracks.push(Track { name, unit, period_s, reference, measured, rate: rate.map(|(_, _, rate)| rate), notes });
     }
     Ok(tracks)
 }

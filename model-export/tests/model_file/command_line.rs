@@ -40,7 +40,7 @@ impl Folder {
     /// Runs a command whose words that end in a known extension are files of this folder.
     fn run(&self, command: &str) -> (u8, String, String) {
         let file = |word: &str| {
-            [".safetensors", ".json", ".csv", ".model", ".txt", ".key", ".pub"].iter().any(|end| word.ends_with(end))
+            [".safetensors", ".json", ".csv", ".model", ".txt", ".key", ".pub", ".learned"].iter().any(|end| word.ends_with(end))
         };
         let words = command.split_whitespace().map(|word| if file(word) { self.path(word) } else { Path::new(word).to_owned() });
         let (mut out, mut messages) = (Vec::new(), Vec::new());
@@ -80,6 +80,32 @@ fn a_lane_alone_needs_no_network() {
     let (code, _, messages) = folder.run("verify lane.model --network net.safetensors");
     assert_eq!(code, FAILED);
     assert!(messages.contains("net.rows.csv") || messages.contains("no network to compare"), "{messages}");
+}
+
+/// What a learner kept is told from a model; damaged, it is refused by name.
+#[test]
+fn inspects_what_was_learned() {
+    use impromptu_firmware::learning::{AxisSettings, Kept, LearningAddOn, Limits, Probe, Response};
+    let folder = Folder::new();
+    let limits = Limits { scale: 1.0, correction: 1.0, feedback: 0.3, rate: 20.0 };
+    let response = Response::second_order(1.0, 6.0, 0.7, 0.03, 100.0);
+    let axis = AxisSettings { response, limits, probe: Probe { size: 0.05, seconds: 4.0 } };
+    let add_on = LearningAddOn::new(&[axis; 2], 100.0, 0.0).unwrap();
+    let mut bytes = [0; Kept::length(2)];
+    add_on.keep(0xabc, &mut bytes).unwrap();
+    std::fs::write(folder.path("a.learned"), bytes).unwrap();
+    let (code, out, _) = folder.run("inspect a.learned");
+    assert_eq!(code, FINE);
+    for words in ["2 axes at 100 Hz, identity 00000abc", "gain 1.000, 6.000 rad/s", "axis 1", "0.000 at -0.17 s", "error rate"] {
+        assert!(out.contains(words), "{words}\n{out}");
+    }
+    let json: serde_json::Value = serde_json::from_str(&folder.run("inspect a.learned --format json").1).unwrap();
+    assert_eq!((&json["kind"], json["axes"][1]["preview"].as_array().unwrap().len()), (&"learned".into(), 12));
+    assert!((json["axes"][0]["delay_s"].as_f64().unwrap() - 0.03).abs() < 1e-6, "{json}");
+    bytes[60] ^= 1;
+    std::fs::write(folder.path("a.learned"), bytes).unwrap();
+    let (code, _, messages) = folder.run("inspect a.learned");
+    assert!(code == FAILED && messages.contains("a.learned") && messages.contains("damaged"), "{messages}");
 }
 
 #[test]

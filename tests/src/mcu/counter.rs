@@ -76,8 +76,9 @@ pub fn build() -> Result<PathBuf> {
     let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("cycles");
     let folder = target_folder();
     fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
-    // Of its own for each process, then renamed: another one may just load it.
-    let own = folder.join(format!("cycles-{}.so", std::process::id()));
+    // In a place of its own, then renamed: another test or process may just load it, or make it too.
+    let made = tempfile::tempdir_in(&folder).with_context(|| format!("cannot write to {}", folder.display()))?;
+    let own = made.path().join("cycles.so");
     let compiler = env::var_os("CC").filter(|name| !name.is_empty()).unwrap_or(OsString::from("cc"));
     let mut command = Command::new(&compiler);
     command.args(["-std=gnu11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden"]).arg(format!("-DPLUGIN_API={interface}"));

@@ -125,7 +125,7 @@ impl Cases {
         let (mut expected, mut words) = (Vec::new(), Vec::new());
         for (tick, [value, rate]) in measured.iter().copied().enumerate() {
             let at = |offset: i32| desired[(tick as i32 + offset).max(0) as usize];
-            let correction = learner.step(at, Some(Measured { value, rate }), Parts::BOTH, Parts::BOTH);
+            let correction = learner.step(at, Some(Measured { value, rate: Some(rate) }), Parts::BOTH, Parts::BOTH);
             expected.push(correction.to_bits());
             words.extend([desired[tick + AHEAD as usize], value, rate].map(f32::to_bits));
         }

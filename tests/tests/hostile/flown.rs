@@ -9,9 +9,16 @@ use std::{
     thread,
 };
 
-use impromptu_firmware::model::Model;
+use impromptu_firmware::{learning::Parts, model::Model};
+use impromptu_flight::learning::FlightLearning;
 use impromptu_reproduction::robustness::{Change, Mismatch, handover::windows};
-use impromptu_sim::{condition::Condition, flights::Loop, plant::Vehicle, trajectory::Trajectory};
+use impromptu_sim::{
+    condition::Condition,
+    flights::{Loop, Response},
+    learned::{LearningLoop, taught, teaching},
+    plant::Vehicle,
+    trajectory::Trajectory,
+};
 
 use super::draw::Draw;
 
@@ -25,6 +32,9 @@ const WINDOW: f64 = 4.0;
 const LOST: f64 = 2.0;
 const LOST_TIMES: f64 = 5.0;
 const LOST_MORE: f64 = 0.5;
+
+/// Seed of what teaches.
+const TAUGHT: u64 = 9;
 
 /// Files of the demo's models, by vehicle and condition.
 pub(crate) struct Models(BTreeMap<(&'static str, &'static str), Vec<u8>>);
@@ -40,6 +50,35 @@ impl Models {
         }
         Self(files)
     }
+}
+
+/// What a minute of strokes taught, by vehicle and condition.
+pub(crate) struct Taught(BTreeMap<(&'static str, &'static str), FlightLearning>);
+
+impl Taught {
+    /// Nothing.
+    pub(crate) fn nothing() -> Self {
+        Self(BTreeMap::new())
+    }
+
+    pub(crate) fn of_a_minute() -> Self {
+        let mut all = BTreeMap::new();
+        for vehicle in ["crazyflie", "crazyflie-brushless"] {
+            for condition in Condition::NAMES {
+                let closed_loop = stock(vehicle, condition);
+                let (parts, response) = (Parts::BOTH, Response::Commissioned);
+                let learned = LearningLoop { closed_loop: &closed_loop, model: None, parts, response, seed: TAUGHT };
+                let strokes = teaching(TAUGHT, 60, 1.0, closed_loop.rate_hz()).expect("strokes");
+                all.insert((vehicle, condition), taught(&learned, 60, &strokes).expect("flights").0);
+            }
+        }
+        Self(all)
+    }
+}
+
+fn stock(vehicle: &str, condition: &str) -> Loop {
+    let condition = Condition::named(condition).expect("a condition");
+    Loop::new(Vehicle::named(vehicle).expect("a vehicle"), "stock", condition).expect("a loop")
 }
 
 /// What came of a draw.
@@ -62,13 +101,13 @@ impl Verdict {
 }
 
 /// Flies and judges each draw, on every processor.
-pub(crate) fn verdicts(models: &Models, draws: &[Draw]) -> Vec<Verdict> {
+pub(crate) fn verdicts(models: &Models, taught: &Taught, draws: &[Draw]) -> Vec<Verdict> {
     let (next, found) = (AtomicUsize::new(0), Mutex::new(vec![Verdict::default(); draws.len()]));
     let work = || {
         loop {
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some(draw) = draws.get(index) else { return };
-            let verdict = judge(models, draw);
+            let verdict = judge(models, taught, draw);
             found.lock().expect("nobody panics with it")[index] = verdict;
         }
     };
@@ -80,25 +119,25 @@ pub(crate) fn verdicts(models: &Models, draws: &[Draw]) -> Vec<Verdict> {
     found.into_inner().expect("nobody panics with it")
 }
 
-fn judge(models: &Models, draw: &Draw) -> Verdict {
+fn judge(models: &Models, taught: &Taught, draw: &Draw) -> Verdict {
     let model = Model::from_bytes(&models.0[&(draw.vehicle, draw.condition)]).expect("a model");
-    let condition = Condition::named(draw.condition).expect("a condition");
-    let closed_loop = Loop::new(Vehicle::named(draw.vehicle).expect("a vehicle"), "stock", condition).expect("a loop");
-    let closed_loop = change(draw).applied(&closed_loop);
+    let closed_loop = change(draw).applied(&stock(draw.vehicle, draw.condition));
     let rate_hz = closed_loop.rate_hz();
     let trajectory = draw.desired.trajectory(rate_hz, draw.direction);
     let flown = closed_loop.delayed(draw.delay_ms * 1e-3);
-    let baseline = squares(&flown, draw, None, &trajectory);
+    let baseline = squares(&flown, draw, None, None, &trajectory);
     let peak = baseline.iter().copied().fold(0.0, f64::max).sqrt();
     let lost = peak > LOST + draw.desired.jump()
         || draw.delay_ms > 0.0 && {
-            let undelayed = squares(&closed_loop, draw, None, &trajectory);
+            let undelayed = squares(&closed_loop, draw, None, None, &trajectory);
             peak > LOST_TIMES * (undelayed.iter().sum::<f64>() / undelayed.len() as f64).sqrt() + LOST_MORE
         };
     if lost {
         return Verdict { lost, ..Verdict::default() };
     }
-    let assisted = squares(&flown, draw, Some(&model), &trajectory);
+    let mut learning = taught.0.get(&(draw.vehicle, draw.condition)).cloned();
+    let flown_model = learning.is_none().then_some(&model);
+    let assisted = squares(&flown, draw, flown_model, learning.as_mut(), &trajectory);
     let ticks = (WINDOW * rate_hz) as usize;
     let preview = model.card().preview_span().1 as usize;
     let [baseline, assisted] = [baseline, assisted].map(|squares| windows(&squares, ticks));
@@ -126,6 +165,13 @@ fn change(draw: &Draw) -> Change {
 }
 
 /// Squared error at each reference tick, m².
-fn squares(closed_loop: &Loop, draw: &Draw, model: Option<&Model<'_>>, trajectory: &Trajectory) -> Vec<f64> {
-    change(draw).fly(closed_loop, model, trajectory, draw.number.into()).expect("a flight").squared_errors()
+fn squares(
+    closed_loop: &Loop,
+    draw: &Draw,
+    model: Option<&Model<'_>>,
+    learning: Option<&mut FlightLearning>,
+    trajectory: &Trajectory,
+) -> Vec<f64> {
+    let flown = change(draw).fly_learning(closed_loop, model, learning, trajectory, draw.number.into());
+    flown.expect("a flight").squared_errors()
 }

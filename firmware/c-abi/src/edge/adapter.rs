@@ -177,6 +177,21 @@ pub unsafe extern "C" fn impromptu_adapter_set_airborne(adapter: *mut AdapterMem
     })
 }
 
+/// Writes what the feedback lane corrected of each reference channel in the last tick, as many numbers as the loop has reference
+/// channels, for what learns beside it (impromptu_learner_tell_other).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_adapter_fed_back(adapter: *mut AdapterMemory, fed_back: *mut f32, count: usize) -> Status {
+    report(|| {
+        let place = Place::new(fed_back)?;
+        // SAFETY: the module's rules.
+        let adapter = unsafe { object::<Stage>(adapter)? };
+        counted(adapter, [None, None, Some(count)])?;
+        // SAFETY: the module's rules.
+        unsafe { place.write_first(&adapter.fed_back(), count) };
+        Ok(())
+    })
+}
+
 /// Switches the network lane and the feedback lane on (not 0) or off; they fade in and out over the model's fade time. With both
 /// off and faded out the reference is the desired one, to the bit.
 #[unsafe(no_mangle)]

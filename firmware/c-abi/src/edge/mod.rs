@@ -14,6 +14,7 @@
 
 mod adapter;
 mod flight;
+mod learner;
 mod model;
 #[cfg(target_os = "none")]
 mod panic;
@@ -30,6 +31,7 @@ use crate::{
 
 pub use adapter::*;
 pub use flight::*;
+pub use learner::*;
 pub use model::*;
 
 /// The status of a call.

@@ -3,16 +3,18 @@
 //! *in* commands as bytes; *out* what the motors and reports of the application are; *never* motors that turn without news, a
 //! report that cannot be decoded, or a refused message that changed something.
 
+mod learning;
+mod random;
+
 use std::vec::Vec;
 
 use impromptu_firmware::adapter::{Job, Lanes};
-use proptest::prelude::*;
 
 use super::*;
 use crate::{
     link::{
         Reports,
-        message::{Inertial, InputReport, Position, TimedSetpoint},
+        message::{Inertial, InputReport, LearnOrder, Position, TimedSetpoint},
     },
     settings::{
         Setting, Settings,
@@ -25,8 +27,8 @@ use crate::{
 const SILENCE: usize = 124;
 
 /// A vehicle and its host. Heights are 1.5 m, where the vehicle always is.
-struct Line {
-    application: Application<'static>,
+struct Line<L = NoLearner> {
+    application: Application<'static, L>,
     sender: Sender,
     reports: Receiver<Reports>,
     heard: Vec<String>,
@@ -56,15 +58,24 @@ fn setpoint(tick: i32) -> Command<'static> {
 impl Line {
     /// A vehicle with its board's settings.
     fn new() -> Self {
-        let mut application = Application::new();
+        Self::with(Application::new())
+    }
+
+    /// Armed, with `setpoints` of a trajectory.
+    fn armed(setpoints: impl IntoIterator<Item = Command<'static>>) -> Self {
+        Self::new().arm(setpoints)
+    }
+}
+
+impl<L: Learns> Line<L> {
+    fn with(mut application: Application<'static, L>) -> Self {
         application.autopilot().configure(&GOOD).unwrap();
         let (sender, reports) = (Sender::new(), Receiver::new());
         Self { application, sender, reports, heard: vec![], outcomes: vec![], inputs: InputReport::default(), tick: 0, epoch: 2 }
     }
 
-    /// Armed, with `setpoints` of a trajectory.
-    fn armed(setpoints: impl IntoIterator<Item = Command<'static>>) -> Self {
-        let mut line = Self::new();
+    fn arm(self, setpoints: impl IntoIterator<Item = Command<'static>>) -> Self {
+        let mut line = self;
         for command in [Command::Hello].into_iter().chain(setpoints).chain([inertial(1), position(1), Command::Arm]) {
             line.say(&command);
         }
@@ -302,83 +313,4 @@ fn a_brake_comes_to_rest_and_stays_until_a_replan() {
     let mut disarmed = Line::new();
     disarmed.say(&Command::Brake);
     assert_eq!(disarmed.outcomes, [Outcome::Refused(Reason::NotArmed)]);
-}
-
-/// A number of any kind: of a vehicle, of none, or none.
-fn any_number() -> impl Strategy<Value = f32> {
-    prop_oneof![
-        8 => -20.0f32..20.0,
-        1 => any::<u32>().prop_map(f32::from_bits),
-        1 => prop::sample::select(vec![f32::MAX, f32::MIN, f32::NAN, f32::INFINITY, 1e-44, 1e4, -1e4, 399.0]),
-    ]
-}
-
-fn any_command() -> impl Strategy<Value = Command<'static>> {
-    let three = || prop::array::uniform3(any_number());
-    let timed = || {
-        (-50i32..300, three(), three(), three(), any_number()).prop_map(|(tick, position, velocity, acceleration, yaw)| {
-            TimedSetpoint { tick, position, velocity, acceleration, yaw }
-        })
-    };
-    prop_oneof![
-        3 => (0u32..1000, three()).prop_map(|(tick, rates)| {
-            Command::Inertial(Inertial { tick, attitude: [0.0, 0.6, 0.8, 0.0], rates })
-        }),
-        3 => (0u32..1000, three(), three(), any_number()).prop_map(|(tick, position, velocity, vertical_acceleration)| {
-            Command::Position(Position { tick, position, velocity, vertical_acceleration })
-        }),
-        4 => timed().prop_map(Command::Setpoint),
-        1 => timed().prop_map(Command::Replan),
-        1 => (0usize..32, any_number()).prop_map(|(index, number)| {
-            let mut settings = GOOD;
-            *numbers(&mut settings)[index] = number;
-            Command::Settings(settings)
-        }),
-        1 => prop::sample::select(vec![
-            Command::Brake, Command::Arm, Command::Disarm, Command::Hello, Command::Lanes(Lanes::BOTH)
-        ]),
-    ]
-}
-
-proptest! {
-    #[test]
-    fn whatever_is_said_reports_decode_references_are_finite_and_silence_ends_it(
-        said in prop::collection::vec(prop::collection::vec(any_command(), 0..4), 1..120)
-    ) {
-        let mut line = Line::armed(hover());
-        for commands in said {
-            for command in commands {
-                line.say(&command);
-            }
-            let (command, reference) = line.fly();
-            prop_assert!(command.fractions().iter().all(|x| (0.0..=1.0).contains(x)));
-            prop_assert!(reference.position.iter().chain(reference.velocity.iter()).all(|x| x.is_finite()));
-        }
-        if line.application.autopilot().armed() {
-            prop_assert!(line.silent() <= SILENCE);
-        }
-    }
-
-    #[test]
-    fn settings_are_taken_whole_or_not_at_all(index in 0usize..32, number in any_number(), divisor in 0u32..9) {
-        let mut settings = GOOD;
-        settings.rates.position_divisor = divisor;
-        *numbers(&mut settings)[index] = number;
-        let (mut told, mut other) = (Line::new(), Line::new());
-        told.say(&Command::Settings(settings));
-        let refused = !matches!(told.outcomes[..], [Outcome::Done]);
-        prop_assert!(refused || (settings.check().is_ok() && settings.rates.control_hz == 500.0));
-        if !refused {
-            other.application.autopilot().configure(&settings).unwrap();
-        }
-        for line in [&mut told, &mut other] {
-            for command in hover().chain([inertial(1), position(1), Command::Arm]) {
-                line.say(&command);
-            }
-        }
-        for _ in 0..20 {
-            prop_assert_eq!(told.fly(), other.fly());
-        }
-        prop_assert_eq!(told.silent(), SILENCE);
-    }
 }

@@ -38,6 +38,11 @@ impl Mixer {
         self.rotor_thrusts(mass * GRAVITY, &Vector3::zeros()).map(|force| force * self.fraction_squared)
     }
 
+    /// The share of the largest thrust of all rotors that a collective thrust, N, is.
+    pub fn share(&self, thrust: f32) -> f32 {
+        0.25 * thrust * self.fraction_squared
+    }
+
     /// How much thrust of a rotor a unit of moment takes at most, as a multiple of what a rotor with nothing else to do would
     /// need: about a third for four rotors in a square, without bound for rotors that can hardly produce some moment.
     pub fn effort(&self, airframe: &Airframe) -> f32 {

@@ -59,8 +59,8 @@ impl Axis {
 }
 
 /// Watches a measured position.
-#[derive(Debug)]
-pub(super) struct Frozen {
+#[derive(Clone, Debug)]
+pub(crate) struct Frozen {
     axes: [Axis; 3],
     /// Velocity, m/s, as it has been
     velocity: Vector3<f32>,
@@ -70,11 +70,11 @@ pub(super) struct Frozen {
 
 impl Frozen {
     /// Nothing seen yet: all zeros.
-    pub(super) const EMPTY: Self = Self { axes: [Axis::NONE; 3], velocity: Vector3::new(0.0, 0.0, 0.0), seconds: 0.0 };
+    pub(crate) const EMPTY: Self = Self { axes: [Axis::NONE; 3], velocity: Vector3::new(0.0, 0.0, 0.0), seconds: 0.0 };
 
     /// A reference tick at a rate, Hz, with the state as it is measured and the desired velocity, m/s. Returns for how many ticks
     /// the position has stood still, if it must have changed since; else 0.
-    pub(super) fn ticks(&mut self, state: &State, desired: &Vector3<f32>, rate_hz: f32) -> u16 {
+    pub(crate) fn ticks(&mut self, state: &State, desired: &Vector3<f32>, rate_hz: f32) -> u16 {
         (self.observe(&state.position, &state.velocity, desired, 1.0 / rate_hz) * rate_hz) as u16
     }
 

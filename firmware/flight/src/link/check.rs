@@ -6,7 +6,9 @@
 
 use super::{
     CHUNK,
-    message::{Command, Inertial, Message, ModelChunk, Motors, Position, Report, Telemetry, TimedSetpoint},
+    message::{
+        Command, Inertial, LearnedPiece, LearningReport, Message, ModelChunk, Motors, Position, Report, Telemetry, TimedSetpoint,
+    },
     outcome::{Quantity, Reason},
 };
 use impromptu_firmware::math;
@@ -52,7 +54,9 @@ impl Message for Command<'_> {
             | Self::Brake
             | Self::ModelBegin { .. }
             | Self::ModelChunk(_)
-            | Self::ModelCommit => Ok(()),
+            | Self::ModelCommit
+            | Self::Learn(_)
+            | Self::Learned { .. } => Ok(()),
         }
     }
 
@@ -71,7 +75,11 @@ impl Message for Report<'_> {
             Self::Telemetry(Telemetry { network, feedback, tracking_error, .. }) => {
                 finite([&[network.weight, feedback.weight, *tracking_error]])
             }
-            Self::Identity(_) | Self::Acknowledge { .. } | Self::Inputs(_) => Ok(()),
+            Self::Learning(LearningReport { commissioned, learned_s, share, correction, .. }) => {
+                finite([&[*commissioned, *learned_s, *share], correction])
+            }
+            Self::Learned(LearnedPiece { bytes, .. }) if bytes.len() > CHUNK => Err(Reason::Length { limit: CHUNK as u32 }),
+            Self::Identity(_) | Self::Acknowledge { .. } | Self::Inputs(_) | Self::Learned(_) => Ok(()),
         }
     }
 

@@ -6,12 +6,15 @@
 use super::{
     Command, FRAME, Outcome, Reason, Report, VERSION, encode,
     message::{
-        FlyingModel, FrameReport, Identity, Inertial, InputReport, LaneReport, ModelChunk, Motors, Position, TRIP_REASONS,
-        Telemetry, TimedSetpoint,
+        FlyingModel, FrameReport, Identity, Inertial, InputReport, LaneReport, LearnOrder, LearnedPiece, LearningReport,
+        ModelChunk, Motors, Position, TRIP_REASONS, Telemetry, TimedSetpoint,
     },
     outcome::{ModelFault, Quantity},
 };
-use impromptu_firmware::adapter::Lanes;
+use impromptu_firmware::{
+    adapter::Lanes,
+    learning::{Phase, Problem, Unfit},
+};
 
 use crate::{
     control::{Airframe, AttitudeGains, PositionGains},
@@ -24,7 +27,7 @@ fn numbers<const N: usize>(first: f32) -> [f32; N] {
 }
 
 /// One of each command.
-pub(super) fn commands() -> [Command<'static>; 13] {
+pub(super) fn commands() -> [Command<'static>; 20] {
     let airframe = Airframe {
         mass: 0.5,
         inertia: numbers(1.0),
@@ -63,6 +66,13 @@ pub(super) fn commands() -> [Command<'static>; 13] {
             yaw: -4.0,
         }),
         Command::Brake,
+        Command::Learn(LearnOrder::Commission),
+        Command::Learn(LearnOrder::Learn),
+        Command::Learn(LearnOrder::Hold),
+        Command::Learn(LearnOrder::Stop),
+        Command::Learn(LearnOrder::Forget),
+        Command::Learn(LearnOrder::Keep),
+        Command::Learned { offset: 192 },
     ]
 }
 
@@ -98,6 +108,13 @@ pub(super) fn reports() -> Vec<Report<'static>> {
         Reason::Range { what: Quantity::Position },
         Reason::Range { what: Quantity::Yaw },
         Reason::Braking,
+        Reason::NoLearner,
+        Reason::Learner(Problem::Unknown { axis: 1 }),
+        Reason::Learner(Problem::Grounded),
+        Reason::Learner(Problem::Moving),
+        Reason::Learner(Problem::Gap),
+        Reason::Learner(Problem::Unfit { axis: 2, why: Unfit::Missing }),
+        Reason::Learner(Problem::Unfit { axis: 2, why: Unfit::Speed }),
     ];
     let mut reports = vec![
         Report::Identity(Identity::new("impromptu 1", None)),
@@ -123,6 +140,23 @@ pub(super) fn reports() -> Vec<Report<'static>> {
     ];
     reports.extend(reasons.map(|reason| Report::Acknowledge { sequence: 7, outcome: Outcome::Refused(reason) }));
     reports.push(Report::Inputs(InputReport { tick: 402, refused: 300, reach: -3, braking: true }));
+    let [commissioned, learned_s, share] = [0.5, 12.5, 0.75];
+    let learning = |phase, problem| LearningReport {
+        phase,
+        recalled: true,
+        commissioned,
+        learned_s,
+        share,
+        forgotten: 300,
+        correction: numbers(-1.0),
+        problem,
+    };
+    for phase in [Phase::Off, Phase::Commissioning, Phase::Learning, Phase::Holding] {
+        reports.push(Report::Learning(learning(phase, None)));
+    }
+    let unfit = Problem::Unfit { axis: 1, why: Unfit::Gain };
+    reports.push(Report::Learning(learning(Phase::Off, Some(unfit))));
+    reports.push(Report::Learned(LearnedPiece { length: 2480, offset: 192, bytes: b"learned" }));
     reports
 }
 
@@ -143,6 +177,13 @@ const PAYLOADS: &str = "
     01a50a
     01a50bde040000803f0000a03f0000c03f000000400000104000002040000040400000504000006040000080c0
     01a50c
+    01a50d00
+    01a50d01
+    01a50d02
+    01a50d03
+    01a50d04
+    01a50d05
+    01a50ec001
     01a500010b696d70726f6d707475203100
     01a500010b696d70726f6d7074752031010866696775726520388486880800
     01a500010b696d70726f6d707475203101086669677572652038848688080101
@@ -176,7 +217,20 @@ const PAYLOADS: &str = "
     01a50307011100
     01a50307011104
     01a503070112
+    01a503070113
+    01a5030701140001
+    01a50307011401
+    01a50307011402
+    01a50307011403
+    01a503070114040200
+    01a503070114040204
     01a5049203ac020501
+    01a50500010000003f000048410000403fac02000080bf000040bf000000bf00
+    01a50501010000003f000048410000403fac02000080bf000040bf000000bf00
+    01a50502010000003f000048410000403fac02000080bf000040bf000000bf00
+    01a50503010000003f000048410000403fac02000080bf000040bf000000bf00
+    01a50500010000003f000048410000403fac02000080bf000040bf000000bf01040102
+    01a506b013c001076c6561726e6564
 ";
 /// One frame, with stuffing, check sum and zero.
 const FRAME_OF_LANES: &str = "0501a505010530c4279e00";
@@ -230,10 +284,11 @@ fn the_largest_of_every_message_fits() {
     let name = "n".repeat(300);
     let model = FlyingModel { name: &name, checksum: most, slot: Some(u8::MAX) };
     let identity = Report::Identity(Identity::new(&name, Some(model)));
-    for report in [telemetry, identity] {
+    let piece = Report::Learned(LearnedPiece { length: most, offset: most, bytes: &[1; super::CHUNK] });
+    for report in [telemetry, identity, piece] {
         assert!(encode(&report, 0, &mut buffer).is_some(), "{report:?}");
     }
-    let [.., Command::Settings(mut settings), _, _, _, _, _, _, _, _] = commands() else { unreachable!() };
+    let [_, _, _, _, Command::Settings(mut settings), ..] = commands() else { unreachable!() };
     settings.rates.position_divisor = most;
     let chunk = ModelChunk { offset: most, bytes: &[1; super::CHUNK] };
     for command in [Command::Settings(settings), Command::ModelChunk(chunk)] {

@@ -4,6 +4,7 @@
 //! arrival, but for the upload of a model, which says where each piece belongs.
 
 mod command;
+mod learning;
 mod report;
 
 use serde::{Deserialize, Serialize};
@@ -14,6 +15,7 @@ use impromptu_firmware::adapter::Lanes;
 use crate::settings::Settings;
 
 pub use command::{Inertial, ModelChunk, Position, TimedSetpoint};
+pub use learning::{LearnOrder, LearnedPiece, LearningReport};
 pub use report::{FlyingModel, FrameReport, Identity, InputReport, LaneReport, Motors, TRIP_REASONS, Telemetry};
 
 /// A message of either direction.
@@ -86,6 +88,13 @@ pub enum Command<'a> {
     Replan(TimedSetpoint),
     /// Come to rest from where the trajectory is now, and stay there until a [`Command::Replan`].
     Brake,
+    /// What the vehicle that learns shall do.
+    Learn(LearnOrder),
+    /// Asks for what was learned, from this byte of it on: a disarmed vehicle answers with [`Report::Learned`].
+    Learned {
+        /// Bytes from the start.
+        offset: u32,
+    },
 }
 
 /// A message from the vehicle.
@@ -107,4 +116,9 @@ pub enum Report<'a> {
     },
     /// What became of what it was told; with each telemetry.
     Inputs(InputReport),
+    /// How far a vehicle that learns is; with each telemetry.
+    Learning(LearningReport),
+    /// A piece of what was learned.
+    #[serde(borrow)]
+    Learned(LearnedPiece<'a>),
 }

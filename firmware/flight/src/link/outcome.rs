@@ -8,7 +8,7 @@ use core::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::CHUNK;
-use impromptu_firmware::model::Refusal;
+use impromptu_firmware::{learning::Problem, model::Refusal};
 
 use crate::{
     settings::Setting,
@@ -84,6 +84,10 @@ pub enum Reason {
     },
     /// The vehicle brakes, or rests where it has braked.
     Braking,
+    /// This firmware has no learner, or the gains are those of a loop beside which it cannot learn.
+    NoLearner,
+    /// The learner cannot do it.
+    Learner(Problem),
 }
 
 /// What a number of a state or a setpoint is of. New ones come last.
@@ -190,6 +194,11 @@ impl fmt::Display for Reason {
             Self::Setting { what } => write!(f, "no vehicle has this {}: correct it, nothing was changed", what.name()),
             Self::Range { what } => write!(f, "{what}: check its unit and what computes it; the sample counts as lost"),
             Self::Braking => write!(f, "the vehicle has braked: begin another trajectory with a re-plan"),
+            Self::NoLearner => write!(
+                f,
+                "the vehicle does not learn: give its firmware a learner, and its position loop gains of second order (kp and kd)"
+            ),
+            Self::Learner(problem) => problem.fmt(f),
         }
     }
 }

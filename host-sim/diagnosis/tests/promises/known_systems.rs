@@ -146,3 +146,45 @@ fn every_gate_says_what_it_saw() {
         assert!(text.contains(part), "`{part}` is missing in\n{text}");
     }
 }
+
+/// A loop of 4 rad/s behind a dead time, under steps, sampled at a rate; both columns by an offset away from zero.
+fn sampled(rate_hz: f64, dead_time_s: f64, offset: f64) -> Record {
+    const H: f64 = 1e-3;
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(5);
+    let (mut inputs, mut height, mut left) = (Vec::new(), 0.0, 0.0);
+    let (mut x, mut v) = (0.0f64, 0.0f64);
+    let every = (1.0 / (rate_hz * H)).round() as usize;
+    let (mut time, mut reference, mut measured) = (Vec::new(), Vec::new(), Vec::new());
+    for step in 0..(60.0 / H) as usize {
+        if left <= 0.0 {
+            (height, left) = (random.random_range(-1.0..1.0), random.random_range(0.3..3.0));
+        }
+        left -= H;
+        inputs.push(height);
+        if step % every == 0 {
+            let white: f64 = StandardNormal.sample(&mut random);
+            time.push(step as f64 * H);
+            reference.push(height + offset);
+            measured.push(x + 3e-3 * white + offset);
+        }
+        let late = step.checked_sub((dead_time_s / H) as usize).map_or(0.0, |step| inputs[step]);
+        v += H * (16.0 * (late - x) - 2.0 * 0.7 * 4.0 * v);
+        x += H * v;
+    }
+    Record::new(&time, &reference, &measured).unwrap()
+}
+
+/// The lag is 2 d / w and the dead time: 0.35 s and that.
+#[test]
+fn neither_the_rate_of_a_log_nor_a_long_dead_time_nor_an_offset_matters() {
+    for (rate_hz, dead_time_s, offset) in
+        [(50.0, 0.0, 0.0), (50.0, 0.0, 1e4), (1000.0, 0.0, 0.0), (1000.0, 0.1, -3e5), (50.0, 0.5, 0.0), (50.0, 1.0, 20.0)]
+    {
+        let found = diagnose(&sampled(rate_hz, dead_time_s, offset), &Settings::default()).unwrap();
+        let (lag, wanted) = (found.properties.lag_s.value, 0.35 + dead_time_s);
+        // A minute is short for a loop that answers after a second: its gain stays undecided.
+        let right = found.verdict == Verdict::WillHelp || dead_time_s == 1.0 && found.verdict != Verdict::WillNot;
+        assert!(right, "{rate_hz} Hz, {dead_time_s} s, {offset}: {}", found.verdict_text());
+        assert!((lag / wanted - 1.0).abs() < 0.05, "{rate_hz} Hz, {dead_time_s} s, {offset}: lag {lag} of {wanted}");
+    }
+}

@@ -45,7 +45,8 @@ fn flown(seed: u32, desired: &[f64], mut correct: impl FnMut(usize, f64, f64) ->
 fn flight(seed: u32, seconds: usize) -> Flight {
     let reference = motion(seed, seconds);
     let (measured, rate) = flown(seed, &reference, |_, _, _| 0.0);
-    let track = Track { name: "x".into(), unit: "m", period_s: 1.0 / HZ, reference, measured, rate: Some(rate) };
+    let track =
+        Track { name: "x".into(), unit: "m", period_s: 1.0 / HZ, reference, measured, rate: Some(rate), notes: Vec::new() };
     Flight { name: format!("flight {seed}"), tracks: vec![track] }
 }
 
@@ -69,7 +70,12 @@ fn the_prediction_is_what_a_linear_loop_then_flies() {
                     tick => at(tick),
                 };
                 let learn = if tick < UNKNOWN { Parts::NONE } else { learn };
-                f64::from(learner.step(around, Some(Measured { value: value as f32, rate: rate as f32 }), learn, Parts::BOTH))
+                f64::from(learner.step(
+                    around,
+                    Some(Measured { value: value as f32, rate: Some(rate as f32) }),
+                    learn,
+                    Parts::BOTH,
+                ))
             });
             let errors = measured.iter().zip(desired).skip(UNKNOWN).map(|(measured, desired)| (measured - desired).powi(2));
             (mean(errors).sqrt(), learner)

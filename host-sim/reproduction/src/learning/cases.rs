@@ -7,7 +7,7 @@ use impromptu_firmware::learning::Parts;
 use impromptu_sim::{
     condition::Condition,
     controller::Controller,
-    flights::{Guessed, Loop},
+    flights::{Guessed, Loop, Response},
     plant::Vehicle,
     rollout::RolloutError,
 };
@@ -65,8 +65,8 @@ pub struct Case {
     pub seconds: Seconds,
     /// Learned parts.
     pub parts: Parts,
-    /// How wrong the guess of the response is.
-    pub guessed: Guessed,
+    /// How the response is known.
+    pub response: Response,
     /// Vehicles that are drawn, each of which flies some of the strokes; 0: the one that is named.
     pub draws: u32,
     /// More delay in the loop once it has learned, s.
@@ -94,7 +94,7 @@ const PLAIN: Case = Case {
     start: Start::Nothing,
     seconds: Seconds::FromFirstStroke,
     parts: Parts::BOTH,
-    guessed: Guessed::RIGHT,
+    response: Response::Commissioned,
     draws: 0,
     then_later_s: 0.0,
     asked: None,
@@ -208,9 +208,9 @@ pub fn cases() -> Vec<Case> {
         ("response guessed half as fast", 1.0, 0.5, 0.0),
         ("response guessed twice as fast", 1.0, 2.0, 0.0),
     ] {
-        let guessed = Guessed { gain, speed, late_s };
-        all.push(Case { what, guessed, ..PLAIN });
-        all.push(Case { what, guessed, controller: Controller::Pid, speed: PID_SPEED, ..PLAIN });
+        let response = Response::Guessed(Guessed { gain, speed, late_s });
+        all.push(Case { what, response, ..PLAIN });
+        all.push(Case { what, response, controller: Controller::Pid, speed: PID_SPEED, ..PLAIN });
     }
     // On top of a model with both of its lanes.
     let model = |start, seconds, asked| Case { start, seconds: Seconds::After(seconds), asked, ..PLAIN };

@@ -4,7 +4,7 @@
 
 use impromptu_report::study::{Asked, Finding, Study};
 
-use super::{Settings, cases::Case, row::Row};
+use super::{Settings, cases::Case, machines::Machine, row::Row};
 
 /// Section of the report.
 pub(super) const SECTION: &str = "Learning in flight";
@@ -31,15 +31,33 @@ pub(super) fn tell(study: &mut Study, settings: &Settings, cases: &[Case], rows:
             "nothing" => "From nothing",
             _ => "On top of a model with both lanes",
         };
-        let mut find = |name: &str, what: &str, value: f64, unit: &str, bound: Option<f64>| {
-            let found = Finding::new(SECTION, &format!("row_{index}_{name}"), &[], &format!("{title}: {what}"), value, unit);
-            let found = found.cell(table, &title, what);
-            study.find(bound.map_or(found.clone(), |bound| found.asked(Asked::AtLeast(bound))));
-        };
-        find("mean", "reduction, mean", row.reduction_mean, "%", asked.map(|[mean, _]| mean));
-        find("worst", "worst", row.reduction_worst, "%", asked.map(|[_, worst]| worst));
-        find("baseline", "baseline", row.baseline_cm_mean, "cm", None);
-        find("error", "left", row.rms_cm_mean, "cm", None);
-        find("minutes", "minutes", row.minutes, "min", None);
+        find(study, row, &format!("row_{index}"), [table, &title], asked, (1.0, "cm"));
+    }
+}
+
+/// A machine that is no quadrotor.
+pub(super) fn tell_machine(study: &mut Study, machine: Machine, row: &Row) {
+    let title = format!("{}, loop {}, {}", row.vehicle, row.kind, row.seconds.words()).replace('_', " ");
+    let table = "Loops that are no quadrotor, from nothing";
+    find(study, row, &row.vehicle, [table, &title], machine.asked(), (10.0, "mrad"));
+}
+
+/// What was found of a row, in a line of a table; `unit` is how many of it are in the row's unit.
+fn find(study: &mut Study, row: &Row, name: &str, [table, title]: [&str; 2], asked: Option<[f64; 2]>, unit: (f64, &str)) {
+    let (scale, unit) = unit;
+    let [mean, worst] = asked.map_or([None; 2], |asked| asked.map(Some));
+    for (key, what, value, unit, bound) in [
+        ("mean", "reduction, mean", row.reduction_mean, "%", mean),
+        ("worst", "worst", row.reduction_worst, "%", worst),
+        ("baseline", "baseline", scale * row.baseline_cm_mean, unit, None),
+        ("error", "left", scale * row.rms_cm_mean, unit, None),
+        ("minutes", "minutes", row.minutes, "min", None),
+    ] {
+        let found = Finding::new(SECTION, &format!("{name}_{key}"), &[], &format!("{title}: {what}"), value, unit);
+        let found = found.cell(table, title, what);
+        study.find(match bound {
+            Some(bound) => found.asked(Asked::AtLeast(bound)),
+            None => found,
+        });
     }
 }

@@ -6,9 +6,9 @@
 use impromptu_sim::{flights::reduction, learned::Flown};
 use serde::Serialize;
 
-use super::{cases::Case, seconds::Seconds};
+use super::{cases::Case, machines::Machine, seconds::Seconds};
 
-/// A row: errors of the test strokes without and with what was learned.
+/// A row: errors of the test strokes without and with what was learned; of a machine that turns, in hundredths of a radian.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
     /// Vehicle.
@@ -51,8 +51,6 @@ pub struct Row {
 
 impl Row {
     pub(super) fn new(case: &Case, seed: u64, flown: &Flown) -> Self {
-        let (reduction_mean, reduction_worst) = reduction(&flown.baseline, &flown.errors);
-        let mean = |errors: &[f64]| 100.0 * errors.iter().sum::<f64>() / errors.len().max(1) as f64;
         Self {
             vehicle: case.vehicle.into(),
             kind: case.kind().into(),
@@ -62,6 +60,29 @@ impl Row {
             start: case.start.name(),
             seconds: case.seconds,
             parts: case.parts_name(),
+            ..Self::found(seed, flown)
+        }
+    }
+
+    /// Of a machine that turns: what is in cm is in hundredths of a radian.
+    pub(super) fn of_machine(machine: Machine, seed: u64, flown: &Flown) -> Self {
+        let [vehicle, kind] = machine.names();
+        Self { vehicle: vehicle.into(), kind: kind.into(), ..Self::found(seed, flown) }
+    }
+
+    /// What was found, from nothing and from the first motion on.
+    fn found(seed: u64, flown: &Flown) -> Self {
+        let (reduction_mean, reduction_worst) = reduction(&flown.baseline, &flown.errors);
+        let mean = |errors: &[f64]| 100.0 * errors.iter().sum::<f64>() / errors.len().max(1) as f64;
+        Self {
+            vehicle: String::new(),
+            kind: String::new(),
+            gains: "own".into(),
+            condition: "noise".into(),
+            speed: 1.0,
+            start: "nothing",
+            seconds: Seconds::FromFirstStroke,
+            parts: "both",
             baseline_cm_mean: mean(&flown.baseline),
             rms_cm_mean: mean(&flown.errors),
             rms_cm_worst: 100.0 * flown.errors.iter().fold(0.0, |worst: f64, error| worst.max(*error)),

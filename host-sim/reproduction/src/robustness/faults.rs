@@ -12,6 +12,7 @@ use impromptu_firmware::{
 };
 use impromptu_flight::{
     flight::{Flight, PREVIEW},
+    learning::FlightLearning,
     types::{MotorCommand, Reference, Setpoint, State, Tick},
 };
 use impromptu_sim::{
@@ -95,7 +96,25 @@ impl Change {
         trajectory: &Trajectory,
         seed: u64,
     ) -> Result<Flown, RolloutError> {
-        let mut stack = FaultyStack::new(self, flown, model)?;
+        self.fly_learning(flown, model, None, trajectory, seed)
+    }
+
+    /// [`Change::fly`] that goes on with what was learned, if something learns.
+    ///
+    /// # Errors
+    /// If the model does not fit the flight stack.
+    pub fn fly_learning(
+        &self,
+        flown: &Loop,
+        model: Option<&Model<'_>>,
+        learning: Option<&mut FlightLearning>,
+        trajectory: &Trajectory,
+        seed: u64,
+    ) -> Result<Flown, RolloutError> {
+        let mut stack = FaultyStack { learning, ..FaultyStack::new(self, flown, model)? };
+        if let Some(learning) = &mut stack.learning {
+            learning.restart();
+        }
         let plan = FlightPlan { log: true, ..FlightPlan::new(trajectory, seed) };
         let record = fly_on(&mut stack, &flown.vehicle, &flown.settings, &flown.condition, &plan)?;
         Ok(Flown { record, lanes: stack.lanes })
@@ -149,6 +168,7 @@ struct FaultyStack<'m> {
     /// Position that stands still.
     held: Option<Vector3<f32>>,
     lanes: Vec<LaneTick>,
+    learning: Option<&'m mut FlightLearning>,
 }
 
 impl<'m> FaultyStack<'m> {
@@ -174,6 +194,7 @@ impl<'m> FaultyStack<'m> {
             seconds: 0.0,
             held: None,
             lanes: Vec::new(),
+            learning: None,
         })
     }
 }
@@ -208,6 +229,9 @@ impl FlightStack for FaultyStack<'_> {
                 told.position += Vector3::new(self.direction.cos(), self.direction.sin(), 0.0).map(|part| (size * part) as f32);
             }
             _ => {}
+        }
+        if let Some(learning) = &mut self.learning {
+            learning.step(&mut self.inside.flight, tick, Some(&told));
         }
         let command = self.inside.step(tick, &told, &mut self.scratch);
         if tick.0.is_multiple_of(self.divisor)

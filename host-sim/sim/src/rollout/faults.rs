@@ -41,7 +41,7 @@ impl<'m> FaultyFlight<'m> {
         if let Some(wanted) = wanted {
             self.loops.position_step(tick, wanted, &self.flight, state);
         }
-        let command = self.loops.attitude_step(tick, &self.flight, state);
+        let command = self.loops.attitude_step(tick, &mut self.flight, state);
         if released && let Some(network) = self.flight.adapter().and_then(|adapter| adapter.model()).and_then(Model::network) {
             self.flight.deliver(job.run(network, scratch));
         }

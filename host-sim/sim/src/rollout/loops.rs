@@ -56,7 +56,7 @@ impl Loops {
     }
 
     /// At each control tick: the attitude part.
-    pub(super) fn attitude_step(&mut self, tick: Tick, flight: &Flight<'_>, state: &State) -> MotorCommand {
+    pub(super) fn attitude_step(&mut self, tick: Tick, flight: &mut Flight<'_>, state: &State) -> MotorCommand {
         match self {
             Self::Se3(link) => flight.attitude_step(link.receive(tick), state),
             Self::Pid(pid, link, _) => pid.attitude_step(link.receive(tick), state),

@@ -118,4 +118,7 @@ pub enum RolloutError {
     /// Unknown gains.
     #[error(transparent)]
     Vehicle(#[from] VehicleError),
+    /// The hover in which the responses are measured was too short, or could not be sampled.
+    #[error("responses are not measured: {0}")]
+    Commission(String),
 }

@@ -113,7 +113,7 @@ impl FlightStack for Software<'_> {
 
     fn step(&mut self, tick: Tick, state: &State) -> MotorCommand {
         if let Some(learning) = &mut self.learning {
-            learning.step(&mut self.inside.flight, tick, state);
+            learning.step(&mut self.inside.flight, tick, Some(state));
         }
         self.inside.step(tick, state, &mut self.scratch)
     }

@@ -40,6 +40,7 @@ mod app {
         autopilot::Meters,
         types::MotorCommand,
     };
+    use static_cell::ConstStaticCell;
     use stm32f4xx_hal::{
         pac::{Interrupt, USART3},
         prelude::*,
@@ -92,7 +93,10 @@ mod app {
         let motors = Motors::new((device.TIM2, device.TIM4), (a.pa1, b.pb11, a.pa15, b.pb9), &mut rcc);
 
         instruments::paint_stack();
-        let Some(Start { application, network, spare, sequence, scratch }) = start(slots()) else { SCB::sys_reset() };
+        static APPLICATION: ConstStaticCell<Application<'static>> = ConstStaticCell::new(Application::new());
+        let Some(Start { application, network, spare, sequence, scratch }) = start(APPLICATION.take(), slots(), &[]) else {
+            SCB::sys_reset()
+        };
         let uploader = Uploader::new(Sector::new(device.FLASH, spare), sequence);
 
         let baud = Line::default().baudrate(LINK_BAUD.bps());

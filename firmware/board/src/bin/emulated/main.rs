@@ -10,7 +10,7 @@
 //! | `control` | SysTick, 500 Hz | 3 | receives, flies a tick, answers |
 //! | `receive` | USART1 | 4 | queues the bytes of the serial port |
 //! | `inference` | an unused vector | 1 | evaluates the network, which may take until the next reference tick |
-//! | `storage` | an unused vector | 1 | stores a piece of a model |
+//! | `storage` | an unused vector | 1 | stores a piece of a model, or what was learned |
 //!
 //! Tasks share nothing but the lock-free [`impromptu_firmware::exchange`].
 #![cfg_attr(target_os = "none", no_std, no_main)]
@@ -25,23 +25,35 @@ mod port;
 #[cfg(target_os = "none")]
 #[rtic::app(device = stm32f4::stm32f405, peripherals = true)]
 mod app {
+    use core::sync::atomic::{AtomicBool, Ordering};
+
     use cortex_m::peripheral::SCB;
-    use impromptu_board::{Cost as _, Start, Tasks, slots::slots, start};
+    use impromptu_board::{Cost as _, Keeping, Start, Tasks, slots, start};
     use impromptu_firmware::{
         exchange::ByteRing,
         network::{Network, Scratch},
-        storage::Uploader,
+        storage::{Journal, Uploader},
     };
-    use impromptu_flight::{application::Application, autopilot::Meters};
+    use impromptu_flight::{
+        application::Application,
+        autopilot::{FlightLearner, Meters},
+        learning::KEPT,
+    };
+    use static_cell::ConstStaticCell;
     use stm32f4::stm32f405::{Interrupt, TIM2, TIM5, USART1};
 
     use crate::{
-        flash::FileSlot,
+        flash::{FileSlot, LEARNED, SLOT},
         instruments::{self, Counter},
         port::{self, Lockstep},
     };
 
     static TASKS: Tasks = Tasks::new();
+    static KEEPING: Keeping = Keeping::new();
+    /// Whether the network has a job that it has not done.
+    static INFERRING: AtomicBool = AtomicBool::new(false);
+    /// Whether a tick of the serial port waits for it.
+    static WAITING: AtomicBool = AtomicBool::new(false);
     /// Bytes from the serial port.
     static RECEIVED: ByteRing<2048> = ByteRing::new();
 
@@ -55,22 +67,25 @@ mod app {
 
     #[local]
     struct Local {
-        application: &'static mut Application<'static>,
+        application: &'static mut Application<'static, FlightLearner>,
         lockstep: Option<Lockstep>,
         meters: Meters,
         counter: Counter<TIM2>,
         network: Option<&'static Network<'static>>,
         inference_counter: Counter<TIM5>,
-        uploader: Uploader<FileSlot>,
+        uploader: Uploader<FileSlot<SLOT>>,
+        journal: Journal<FileSlot<LEARNED>, KEPT>,
     }
 
     #[init]
     fn init(cx: init::Context) -> (Shared, Local) {
         instruments::paint_stack();
-        let Some(Start { application, network, spare, sequence, scratch }) = start(slots()) else {
-            semihosting::process::exit(1)
-        };
-        let uploader = Uploader::new(FileSlot::new(spare), sequence);
+        static APPLICATION: ConstStaticCell<Application<'static, FlightLearner>> =
+            ConstStaticCell::new(Application::with(FlightLearner::new()));
+        let started = start(APPLICATION.take(), slots::slots(), slots::learned());
+        let Some(Start { application, network, spare, sequence, scratch }) = started else { semihosting::process::exit(1) };
+        let uploader = Uploader::new(FileSlot::spare(spare), sequence);
+        let journal = Journal::new(FileSlot::learned(slots::learned()));
         let lockstep = Lockstep::open();
         let counter = Counter::new(cx.device.TIM2);
         let inference_counter = Counter::new(cx.device.TIM5);
@@ -80,7 +95,7 @@ mod app {
             port::start_serial(&cx.device.USART1);
         }
         let meters = Meters::default();
-        let local = Local { application, lockstep, meters, counter, network, inference_counter, uploader };
+        let local = Local { application, lockstep, meters, counter, network, inference_counter, uploader, journal };
         (Shared { scratch, serial: cx.device.USART1 }, local)
     }
 
@@ -128,12 +143,19 @@ mod app {
                         bytes => on_bytes(bytes),
                     }
                 }
-                // An upload comes without news of the attitude.
-                application.informed() || !application.autopilot().armed()
+                // No clock says when the next tick is due, so a busy host may leave the network no time at all: it gets what it
+                // needs. An upload comes without news of the attitude.
+                let inferring = INFERRING.load(Ordering::Relaxed);
+                WAITING.store(inferring, Ordering::Relaxed);
+                !inferring && (application.informed() || !application.autopilot().armed())
             }
         };
         if due && TASKS.fly(application, meters, counter, received).job {
+            INFERRING.store(true, Ordering::Relaxed);
             rtic::pend(Interrupt::DCMI);
+        }
+        if TASKS.keep(application, &KEEPING) {
+            rtic::pend(Interrupt::CRYP);
         }
         match lockstep {
             Some(lockstep) => {
@@ -149,11 +171,16 @@ mod app {
     #[task(binds = DCMI, priority = 1, local = [network, inference_counter], shared = [scratch])]
     fn inference(cx: inference::Context) {
         TASKS.infer(*cx.local.network, cx.shared.scratch, cx.local.inference_counter);
+        INFERRING.store(false, Ordering::Relaxed);
+        if WAITING.load(Ordering::Relaxed) {
+            SCB::set_pendst();
+        }
     }
 
-    #[task(binds = CRYP, priority = 1, local = [uploader], shared = [scratch])]
+    #[task(binds = CRYP, priority = 1, local = [uploader, journal], shared = [scratch])]
     fn storage(cx: storage::Context) {
         TASKS.store(cx.local.uploader, cx.shared.scratch);
+        TASKS.store_learned(cx.local.journal, &KEEPING);
         // Over the serial port there is a control tick only when something is received: the outcome is to be told.
         SCB::set_pendst();
     }

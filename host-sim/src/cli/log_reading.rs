@@ -1,0 +1,61 @@
+//! What is stated about logs that are read, where they leave it open.
+//!
+//! *in* arguments; *out* how a log is read; *never* a prompt: what is open is refused with exit code 2.
+
+use clap::{Args, ValueEnum};
+use impromptu_diagnosis::plausibility::{Reading, TimeUnit};
+use impromptu_training::{channel::ChannelError, track::TrackError};
+
+use super::Invocation;
+
+/// How logs are read.
+#[derive(Clone, Copy, Debug, Args)]
+pub(super) struct LogReading {
+    /// Unit of the time; needed where it goes by whole numbers [default: s].
+    #[arg(long, value_enum)]
+    time_unit: Option<Unit>,
+    /// The measured value counts against the reference, as in another frame.
+    #[arg(long)]
+    negate_measured: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Unit {
+    S,
+    Ms,
+    Us,
+    Ns,
+}
+
+impl LogReading {
+    pub(super) fn reading(self) -> Reading {
+        let time_unit = self.time_unit.map(|unit| match unit {
+            Unit::S => TimeUnit::Seconds,
+            Unit::Ms => TimeUnit::Milliseconds,
+            Unit::Us => TimeUnit::Microseconds,
+            Unit::Ns => TimeUnit::Nanoseconds,
+        });
+        Reading { time_unit, negated: self.negate_measured }
+    }
+}
+
+/// Says what was done to a log, once for all its axes.
+pub(super) fn say<'a>(invocation: &Invocation, file: &str, notes: impl Iterator<Item = &'a String>) {
+    let mut said: Vec<&String> = Vec::new();
+    for note in notes {
+        if !said.contains(&note) {
+            invocation.console.note(&format!("{file}: {note}"));
+            said.push(note);
+        }
+    }
+}
+
+/// Whether the arguments leave open how a log is meant.
+pub(super) fn leaves_open(error: &anyhow::Error) -> bool {
+    let open = |error: &ChannelError| matches!(error, ChannelError::Implausible { source, .. } if source.leaves_open());
+    match error.downcast_ref() {
+        Some(TrackError::Ambiguous { .. }) => true,
+        Some(TrackError::Channel(error)) => open(error),
+        None => error.downcast_ref().is_some_and(open),
+    }
+}
