@@ -5,6 +5,7 @@
 #        tests/run.sh fast   format, lints and unit tests
 #        tests/run.sh long   what is too long for everything: whole tables, fuzzing for minutes
 # IMPROMPTU_FUZZ_SECONDS: how long is fuzzed, all targets together (20; long: 600)
+# PROPTEST_RNG_SEED: what the cases of property tests are drawn from (1; long: the time)
 set -eu
 cd "$(dirname "$0")/.."
 tier=${1:-all}
@@ -95,6 +96,9 @@ version=$(rustc --version | cut -d' ' -f2)
     fail "Rust $version is older than $oldest; run: rustup update stable"
 # Flags from outside would change what is built, above all for the microcontroller (.cargo/config.toml).
 unset RUSTFLAGS RUSTDOCFLAGS CARGO_BUILD_TARGET
+[ -n "${PROPTEST_RNG_SEED:-}" ] || { [ "$tier" = long ] && PROPTEST_RNG_SEED=$(date +%s) || PROPTEST_RNG_SEED=1; }
+export PROPTEST_RNG_SEED
+echo "property tests with PROPTEST_RNG_SEED=$PROPTEST_RNG_SEED"
 
 for component in rustfmt clippy; do
     cargo "$(echo $component | sed 's/rustfmt/fmt/')" --version >/dev/null 2>&1 ||
