@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::{
     add_on::Features,
     excitation::{self, Coverage},
-    identification::{Identified, identify},
+    identification::{Draws, Identified, identify},
     plausibility::moves,
     prediction::{Prediction, predict, window},
     properties::Properties,
@@ -129,6 +129,8 @@ pub struct Diagnosis {
 const MOST_SAMPLES: usize = 16_000;
 /// Sub-rate in multiples of the band that passes the loop.
 const SAMPLES_A_PERIOD: f64 = 16.0;
+/// How often the sub-rate is halved if nothing is found at it.
+const SLOWER: usize = 4;
 /// Coefficients that the reference has to tell apart.
 const LEAST_ORDER: usize = 5;
 /// Least share of the measured variance that a model has to explain.
@@ -146,7 +148,7 @@ pub struct Assessment {
     /// Model and covariance.
     pub identified: Identified,
     /// Models that could as well be the true one.
-    pub draws: Vec<TransferFunction>,
+    pub draws: Draws,
     /// Properties.
     pub properties: Properties,
     /// Excitation.
@@ -167,14 +169,28 @@ pub fn assess(record: &Record, settings: &Settings) -> Result<Assessment, Diagno
     if !record.segments.iter().any(|segment| moves(&segment.measured)) {
         return Err(DiagnosisError::NoAnswer);
     }
-    let divisor = match settings.sub_rate_hz {
+    let slowest = match settings.sub_rate_hz {
         Some(asked) if !(asked > 0.0 && asked <= 1.01 * rate_hz) => return Err(DiagnosisError::SubRate { asked, rate: rate_hz }),
-        Some(asked) => (rate_hz / asked).round().max(1.0) as usize,
-        None => {
-            let band = excitation::band_at_any_rate(record);
-            (rate_hz / (SAMPLES_A_PERIOD * band)).floor().max(1.0) as usize
-        }
+        Some(asked) => return assess_at(record, (rate_hz / asked).round().max(1.0) as usize, settings),
+        None => record.longest() / FEWEST_ROWS,
     };
+    let first = excitation::divisor(record, SAMPLES_A_PERIOD, MOST_SAMPLES);
+    let found = assess_at(record, first, settings);
+    // What a log shows may drown at a high rate, in noise or in rounding.
+    let too_fast = |found: &Result<Assessment, DiagnosisError>| {
+        matches!(found, Err(DiagnosisError::Unexplained { .. } | DiagnosisError::FewTones { .. }))
+    };
+    let slower = (1..=SLOWER).map(|power| first << power).take_while(|divisor| *divisor <= slowest);
+    if too_fast(&found) {
+        slower.map(|divisor| assess_at(record, divisor, settings)).find(Result::is_ok).unwrap_or(found)
+    } else {
+        found
+    }
+}
+
+/// The same at every `divisor`-th row.
+fn assess_at(record: &Record, divisor: usize, settings: &Settings) -> Result<Assessment, DiagnosisError> {
+    let rate_hz = 1.0 / record.period_s;
     let record = record.slower(divisor).shorter(MOST_SAMPLES).centred();
     let sub_rate_hz = rate_hz / divisor as f64;
     if record.len() < FEWEST_ROWS || record.shortest() < FEWEST_ROWS / 2 {
@@ -191,7 +207,7 @@ pub fn assess(record: &Record, settings: &Settings) -> Result<Assessment, Diagno
     let mut random = Xoshiro256PlusPlus::seed_from_u64(settings.seed);
     let draws = identified.draws(&record, settings.draws, &mut random);
     let lowest_hz = excitation::lowest(&record);
-    let mut properties = Properties::of(&identified, &draws, &record, lowest_hz);
+    let mut properties = Properties::of(&identified, &draws.models, &record, lowest_hz);
     if properties.explained < LEAST_EXPLAINED {
         return Err(DiagnosisError::Unexplained { percent: 100.0 * properties.explained });
     }
@@ -203,7 +219,7 @@ pub fn assess(record: &Record, settings: &Settings) -> Result<Assessment, Diagno
     // The mean before decimation leaves zeros at half the sub-rate that are its own, not the loop's.
     let trusted_hz = if divisor > 1 { 0.25 * sub_rate_hz } else { 0.5 * sub_rate_hz };
     let coverage = excitation::coverage(&record, properties.bandwidth_hz.value, lowest_hz, trusted_hz);
-    let gates = Gates::of(&properties, &coverage, 0.5 * sub_rate_hz);
+    let gates = Gates::of(&properties, &coverage, [&draws.models, &identified.rivals], sub_rate_hz);
     Ok(Assessment { rate_hz, sub_rate_hz, identified, draws, properties, coverage, gates, record })
 }
 
@@ -217,7 +233,7 @@ pub fn diagnose(record: &Record, settings: &Settings) -> Result<Diagnosis, Diagn
     let seed = settings.seed;
     let too_short = || DiagnosisError::Short { rows: record.len(), sub_rate_hz, needed: 4 * FEWEST_ROWS };
     let best = window(&record, &identified, features, seed).ok_or_else(too_short)?;
-    let of = |features| predict(&record, &identified, &draws, best, features, seed);
+    let of = |features| predict(&record, &identified, &draws.models, best, features, seed);
     let prediction = of(features).ok_or_else(too_short)?;
     let recommended = recommended_divisor(&properties, excitation::band(&record), record.period_s);
     Ok(Diagnosis {
@@ -225,7 +241,7 @@ pub fn diagnose(record: &Record, settings: &Settings) -> Result<Diagnosis, Diagn
         rate_hz,
         sub_rate_hz,
         samples: record.len(),
-        verdict: Verdict::of(&gates, &prediction),
+        verdict: Verdict::of(&gates, &prediction, draws.lost),
         recommended_sub_rate_hz: sub_rate_hz / recommended as f64,
         recommended_preview_s: best.preview as f64 * record.period_s,
         with_difference_learning: if features == Features::Absolute { of(Features::Relative) } else { None },

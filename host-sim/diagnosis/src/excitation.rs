@@ -15,6 +15,8 @@ pub struct Coverage {
     pub share: f64,
     /// Highest frequency with that coherence, Hz.
     pub highest_hz: f64,
+    /// Frequency above which nothing is judged, Hz.
+    pub trusted_hz: f64,
     /// Lowest frequency that the record shows, Hz: a twentieth of the reference's variance is at it and below. What happens at
     /// rest is extrapolated from here.
     pub lowest_hz: f64,
@@ -52,6 +54,37 @@ pub fn order_of_excitation(record: &Record) -> usize {
     eigenvalues.iter().filter(|value| **value > RANK * largest).count()
 }
 
+/// Most ticks by which two columns are aligned, and samples that are looked at for it.
+const LATEST: usize = 1024;
+const ALIGNED_BY: usize = 8_000;
+
+/// Ticks by which the measured value is most like the reference before it, `most` at most, after `of` was done to each column.
+/// Whether the loop's gain is positive does not matter.
+fn lag(record: &Record, most: usize, of: impl Fn(&[f64]) -> Vec<f64>) -> usize {
+    let record = record.clone().shorter(ALIGNED_BY);
+    let most = most.min(record.longest() / 4);
+    let columns: Vec<[Vec<f64>; 2]> =
+        record.segments.iter().map(|Segment { reference, measured }| [of(reference), of(measured)]).collect();
+    let alike = |lag: usize| -> f64 {
+        let of = |[reference, measured]: &[Vec<f64>; 2]| -> f64 {
+            reference.iter().zip(measured.iter().skip(lag)).map(|(reference, measured)| reference * measured).sum()
+        };
+        let count: usize = columns.iter().map(|[reference, _]| reference.len().saturating_sub(lag)).sum();
+        columns.iter().map(of).sum::<f64>().abs() / count.max(1) as f64
+    };
+    let best = (0..=most).map(|lag| (lag, alike(lag))).max_by(|a, b| a.1.total_cmp(&b.1));
+    best.map_or(0, |(lag, _)| lag)
+}
+
+fn increments(values: &[f64]) -> Vec<f64> {
+    values.windows(2).map(|pair| pair[1] - pair[0]).collect()
+}
+
+fn centred(values: &[f64]) -> Vec<f64> {
+    let mean = mean(values);
+    values.iter().map(|value| value - mean).collect()
+}
+
 /// Spectra of increments, line by line: the lines' spacing in Hz; reference, measured, cross.
 struct Spectra {
     spacing_hz: f64,
@@ -59,15 +92,18 @@ struct Spectra {
 }
 
 impl Spectra {
-    /// Welch's method on increments (which are whiter than positions): Hann windows that overlap by half.
+    /// Welch's method on increments (which are whiter than positions): Hann windows that overlap by half. The measured value is
+    /// taken as many ticks later as it comes: else a window shows less of it the later it is.
     fn new(record: &Record, length: usize) -> Self {
         let count = length / 2;
         let mut lines = vec![(0.0, 0.0, Complex::default()); count];
         let basis: Vec<Complex<f64>> =
             (0..length).map(|k| Complex::from_polar(1.0, -std::f64::consts::TAU * k as f64 / length as f64)).collect();
+        let late = lag(record, LATEST, increments);
         let hann = |k: usize| (std::f64::consts::PI * k as f64 / length as f64).sin().powi(2);
         for Segment { reference, measured } in &record.segments {
-            for first in (0..(reference.len()).saturating_sub(length)).step_by(length / 2) {
+            let measured = measured.get(late..).unwrap_or_default();
+            for first in (0..measured.len().saturating_sub(length)).step_by(length / 2) {
                 let part = |values: &[f64]| -> Vec<f64> {
                     (0..length).map(|k| hann(k) * (values[first + k + 1] - values[first + k])).collect()
                 };
@@ -115,23 +151,39 @@ pub fn band(record: &Record) -> f64 {
 const GLANCE: usize = 40_000;
 const FEWEST: usize = 256;
 /// A band is shown by the rate at which it is this many lines wide at least, and at most this share of the rate.
-const LINES: f64 = 3.0;
+const LINES: f64 = 6.0;
 const SHARE: f64 = 0.3;
 
-/// [`band`] of a record of any rate. What is logged much faster than the loop answers shows it in its first line or not at all,
-/// below the noise of the increments: then the band is that of the record at a half of the rate, a quarter, and so on.
-pub fn band_at_any_rate(record: &Record) -> f64 {
-    let mut divisor = 1;
-    while record.longest() / divisor >= FEWEST {
-        let slower = record.slower(divisor).shorter(GLANCE);
+/// [`band`] of a record of any rate, `None` if it is shown at none. What is logged much faster than the loop answers shows it in
+/// its first line or not at all, below the noise of the increments: then the band is that of the record at a half of the rate, a
+/// quarter, and so on.
+fn band_at_any_rate(record: &Record) -> Option<f64> {
+    let divisors = (0..).map(|power| 1 << power).take_while(|divisor| record.longest() / divisor >= FEWEST);
+    divisors.map(|divisor| record.slower(divisor).shorter(GLANCE)).find_map(|slower| {
         let found = band(&slower);
         let spacing_hz = 1.0 / (window(&slower) as f64 * slower.period_s);
-        if (LINES * spacing_hz..=SHARE / slower.period_s).contains(&found) {
-            return found;
-        }
-        divisor *= 2;
-    }
-    band(&record.clone().shorter(GLANCE))
+        (LINES * spacing_hz..=SHARE / slower.period_s).contains(&found).then_some(found)
+    })
+}
+
+/// Ticks of the sub-rate by which a loop lags, at least: with fewer its lag is a matter of the form of the model.
+const LAG: f64 = 8.0;
+/// The same where the log is too short to show a band.
+const LAG_ALONE: f64 = 16.0;
+/// Rows of a tick from which the lag is taken.
+const FINER: usize = 8;
+/// Where no band says how long a tick may be, it is this part of the longest stretch at first.
+const SPAN: usize = 200;
+
+/// How many rows of a record make a tick of the add-on: the band is `samples_a_period` times slower at most, and the loop lags by
+/// [`LAG`] ticks at least so far as `most` samples allow.
+pub fn divisor(record: &Record, samples_a_period: f64, most: usize) -> usize {
+    let of_band = band_at_any_rate(record).map(|band| 1.0 / (samples_a_period * band * record.period_s));
+    let (span, ticks) = of_band.map_or((record.longest() / SPAN, LAG_ALONE), |rows| (rows as usize, LAG));
+    let fine = (span / FINER).max(1);
+    let of_lag = (lag(&record.slower(fine), 40 * (span / fine).max(1), centred) * fine) as f64 / ticks;
+    let affordable = record.len().div_ceil(most);
+    of_band.unwrap_or(of_lag).min(of_lag.max(affordable as f64)).max(1.0) as usize
 }
 
 /// Share of the reference's variance that lies at the lowest frequency and below.
@@ -182,6 +234,7 @@ pub fn coverage(record: &Record, bandwidth_hz: f64, lowest_hz: f64, trusted_hz: 
     Coverage {
         share: seen as f64 / inside as f64,
         highest_hz: (highest as f64 * spectra.spacing_hz).min(trusted_hz),
+        trusted_hz,
         lowest_hz,
         order: order_of_excitation(record),
     }

@@ -1,31 +1,47 @@
-//! From a record to a transfer function with the covariance of its coefficients.
+//! From a record to transfer functions that could be the true one.
 //!
 //! *in* a record at the sub-rate; *out* [`Identified`]; *never* an unstable model; *source* Zhu and Hjalmarsson, "The Box-Jenkins
 //! Steiglitz-McBride algorithm", Automatica 65 (2016): whiten with the high-order [`Arx`], then Steiglitz-McBride; here polished
 //! by Levenberg-Marquardt on the same whitened output error. Consistent for noise of any colour, because the reference does not
 //! depend on it. Order, length of the numerator and dead time: Schwarz's criterion (BIC), whose weights also say how sure the
-//! dead time is.
+//! dead time is. What else could be true is told by all forms together, each with its weight by Akaike's criterion (Burnham and
+//! Anderson, "Model selection and multimodel inference", 2002): a form that the log does not rule out may have the zero, or the
+//! lag, that the best one lacks.
 
 use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
 
 use crate::{
     arx::Arx,
-    least_squares::{Regression, Solution},
-    polynomial::{delayed, filter, is_stable},
+    output_error::{Candidate, Whitened, coefficients},
+    polynomial::is_stable,
     record::{Record, Segment},
     transfer_function::TransferFunction,
 };
+
+/// A form of model that the log does not rule out.
+#[derive(Clone, Debug)]
+pub struct Member {
+    /// Its weight; those of all members sum to 1.
+    pub weight: f64,
+    /// The best model of this form.
+    pub model: TransferFunction,
+    /// Covariance of numerator, denominator without its first 1, whitened offset, in this order; larger than white errors explain
+    /// where the model is not the whole truth.
+    pub covariance: DMatrix<f64>,
+}
 
 /// A model with its uncertainty.
 #[derive(Clone, Debug)]
 pub struct Identified {
     /// The model.
     pub model: TransferFunction,
-    /// Covariance of numerator, denominator without its first 1, whitened offset, in this order; larger than white errors explain
-    /// where the model is not the whole truth.
-    pub covariance: DMatrix<f64>,
+    /// Forms that could be the true one, the likeliest first.
+    pub members: Vec<Member>,
+    /// The best models of all forms that explain the log nearly as well as the best of all, with a few coefficients more.
+    pub rivals: Vec<TransferFunction>,
     /// Weight of each dead time, in ticks, after the data; they sum to 1.
     pub dead_times: Vec<(usize, f64)>,
     /// Noise at the output, segment by segment: measured minus simulated, in the output's unit.
@@ -36,31 +52,24 @@ pub struct Identified {
 
 /// Highest order of the denominator.
 const HIGHEST_ORDER: usize = 4;
-/// Blocks from which the errors' spread is taken, at most: fewer and longer ones where the loop settles slowly.
-const MOST_BLOCKS: usize = 60;
 /// A draw that leaves more than this times what the model leaves of the log, in mean square, could not be the true one: where
 /// poles nearly cancel zeros, a normal distribution of coefficients reaches far out of the data's valley.
 const WORSE: f64 = 1.5;
+/// A form is a rival if its likelihood is within this of the best one's, twice in logarithms: chi-squared, two coefficients, 95 %.
+const RIVAL: f64 = 6.0;
+/// Coefficients that a rival may have more than the best model: others find zeros beside poles in any noise.
+const RIVAL_SIZE: f64 = 2.0;
+/// How often a draw that could not be the true one is halved in its distance from the middle.
+const HALVINGS: usize = 12;
 /// Longest dead time tried, ticks.
 const LONGEST_DEAD_TIME: usize = 12;
 /// The same of a loop that is seen to answer later.
-const LATEST: usize = 100;
-
-struct Candidate {
-    model: TransferFunction,
-    covariance: DMatrix<f64>,
-    criterion: f64,
-}
-
-/// Whitened signals, and the rows that are scored.
-struct Whitened {
-    segments: Vec<Segment>,
-    /// A(1): what the whitening makes of a constant.
-    level: f64,
-    /// Rows at the start of each segment whose past is not known.
-    skipped: usize,
-    rows: usize,
-}
+const LATEST: usize = 400;
+/// Dead times of a late loop that are tried first.
+const TRIED: usize = 60;
+/// Forms of less weight than this share of the best one's are not drawn from, nor more of them than this.
+const LEAST_WEIGHT: f64 = 0.02;
+const MOST_MEMBERS: usize = 12;
 
 /// Dead times that are tried, ticks: [`LONGEST_DEAD_TIME`], or up to the lag at which the two columns move most alike, if that is
 /// twice as late and more: a loop answers before that.
@@ -86,41 +95,94 @@ pub fn identify(record: &Record) -> Option<Identified> {
     if whitened.rows < 40 {
         return None;
     }
-    let mut candidates: Vec<Candidate> = Vec::new();
+    let schwarz = |candidate: &Candidate| candidate.deviance + candidate.size() * (whitened.rows as f64).ln();
+    let best = |candidates: &[Candidate]| -> Option<usize> {
+        (0..candidates.len()).min_by(|&a, &b| schwarz(&candidates[a]).total_cmp(&schwarz(&candidates[b])))
+    };
+    let fits = |forms: Vec<[usize; 3]>| -> Vec<Candidate> {
+        forms.into_par_iter().filter_map(|[order, terms, dead_time]| whitened.fit(order, terms, dead_time)).collect()
+    };
     // Where the dead time lies is seen with few coefficients; the rest is tried round it.
-    for dead_time in (0..=LONGEST_DEAD_TIME).chain((LONGEST_DEAD_TIME + 2..=longest).step_by(2)) {
-        candidates.extend([(2, 1), (2, 2), (3, 3)].into_iter().filter_map(|(n, m)| whitened.fit(n, m, dead_time)));
-    }
-    let near = best(&candidates)?.model.dead_time;
-    for order in 1..=HIGHEST_ORDER {
-        for terms in 1..=order + 1 {
-            for dead_time in near.saturating_sub(2)..=near + 2 {
-                if !matches!((order, terms), (2, 1) | (2, 2) | (3, 3)) {
-                    candidates.extend(whitened.fit(order, terms, dead_time));
-                }
-            }
+    let step = (longest / TRIED).max(2);
+    let dead_times = (0..=LONGEST_DEAD_TIME).chain((LONGEST_DEAD_TIME + step..=longest).step_by(step));
+    let first = [[2, 1], [2, 2], [3, 3]];
+    let mut candidates =
+        fits(dead_times.flat_map(|dead_time| first.map(|[order, terms]| [order, terms, dead_time])).collect());
+    let near = candidates[best(&candidates)?].model.dead_time;
+    let near = near.saturating_sub(step)..=near + step;
+    let tried = |candidates: &[Candidate], form: &[usize; 3]| candidates.iter().any(|candidate| candidate.form() == *form);
+    let orders = || (1..=HIGHEST_ORDER).flat_map(|order| (1..=order + 1).map(move |terms| [order, terms]));
+    let others = orders().flat_map(|[order, terms]| near.clone().map(move |dead_time| [order, terms, dead_time]));
+    candidates.extend(fits(others.filter(|form| !tried(&candidates, form)).collect()));
+    // A model of few poles takes dead time for the poles that it lacks: each form goes its own way to the best one from there.
+    for _ in 0..longest {
+        let next = orders().flat_map(|[order, terms]| {
+            let same = candidates.iter().filter(|candidate| candidate.form()[..2] == [order, terms]);
+            let best = same.min_by(|a, b| a.deviance.total_cmp(&b.deviance)).map(|best| best.model.dead_time);
+            let around = best.map(|dead_time| [dead_time.saturating_sub(1), dead_time + 1]);
+            around.into_iter().flatten().map(move |dead_time| [order, terms, dead_time])
+        });
+        let next: Vec<[usize; 3]> = next.filter(|form| !tried(&candidates, form)).collect();
+        let found = fits(next);
+        if found.is_empty() {
+            break;
         }
+        candidates.extend(found);
     }
     let chosen = best(&candidates)?;
     let least = |dead_time: usize| {
         let of = candidates.iter().filter(|candidate| candidate.model.dead_time == dead_time);
-        of.map(|candidate| candidate.criterion).fold(f64::INFINITY, f64::min)
+        of.map(&schwarz).fold(f64::INFINITY, f64::min)
     };
-    let weights: Vec<(usize, f64)> = (0..=longest + 2).map(|d| (d, (0.5 * (chosen.criterion - least(d))).exp())).collect();
+    let of_chosen = schwarz(&candidates[chosen]);
+    let weights: Vec<(usize, f64)> = (0..=longest + step).map(|d| (d, (0.5 * (of_chosen - least(d))).exp())).collect();
     let total: f64 = weights.iter().map(|(_, weight)| weight).sum();
-    let mut model = chosen.model.clone();
+    let mut model = candidates[chosen].model.clone();
     level(&mut model, record);
     let noise = record
         .segments
         .iter()
         .map(|segment| segment.measured.iter().zip(model.simulate(&segment.reference)).map(|(y, model)| y - model).collect());
+    let (members, rivals) = members(&whitened, &candidates, chosen);
     Some(Identified {
         noise: noise.collect(),
         dead_times: weights.into_iter().map(|(d, weight)| (d, weight / total)).filter(|(_, weight)| *weight > 1e-4).collect(),
         model,
-        covariance: whitened.robust(&chosen.model, &chosen.covariance),
+        members,
+        rivals,
         whitening_order: arx.order,
     })
+}
+
+/// The forms that the log does not rule out, and the rivals. Errors that are not white make every difference of likelihoods larger than it is, by
+/// as much as they make the covariance larger.
+fn members(whitened: &Whitened, candidates: &[Candidate], chosen: usize) -> (Vec<Member>, Vec<TransferFunction>) {
+    let of_chosen = &candidates[chosen];
+    let robust = whitened.robust(of_chosen);
+    let spread = of_chosen.covariance.clone().cholesky().map_or(1.0, |white| (white.inverse() * &robust).trace() / of_chosen.size());
+    let deviance = |candidate: &Candidate| candidate.deviance / spread.max(1.0);
+    let smallest = candidates.iter().map(deviance).fold(f64::INFINITY, f64::min);
+    let rivals = candidates.iter().filter(|candidate| {
+        deviance(candidate) <= smallest + RIVAL && candidate.size() <= of_chosen.size() + RIVAL_SIZE
+    });
+    let rivals = rivals.map(|candidate| candidate.model.clone()).collect();
+    let akaike = |candidate: &Candidate| deviance(candidate) + 2.0 * candidate.size();
+    let least = candidates.iter().map(akaike).fold(f64::INFINITY, f64::min);
+    let mut weighted: Vec<(f64, usize)> =
+        candidates.iter().enumerate().map(|(index, candidate)| ((0.5 * (least - akaike(candidate))).exp(), index)).collect();
+    weighted.retain(|(weight, index)| *weight > LEAST_WEIGHT || *index == chosen);
+    weighted.sort_by(|a, b| b.0.total_cmp(&a.0));
+    weighted.truncate(MOST_MEMBERS);
+    let total: f64 = weighted.iter().map(|(weight, _)| weight).sum();
+    let members = weighted
+        .into_par_iter()
+        .map(|(weight, index)| Member {
+            weight: weight / total,
+            model: candidates[index].model.clone(),
+            covariance: whitened.robust(&candidates[index]),
+        })
+        .collect();
+    (members, rivals)
 }
 
 /// The offset that leaves no mean. Whitening takes slow noise away and the constant with it, so that the whitened one is
@@ -139,231 +201,59 @@ fn level(model: &mut TransferFunction, record: &Record) -> f64 {
     squares / count.max(1) as f64 - mean * mean
 }
 
-fn best(candidates: &[Candidate]) -> Option<&Candidate> {
-    candidates.iter().min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+/// Models that could as well be the true one.
+#[derive(Clone, Debug)]
+pub struct Draws {
+    /// Stable models of the members' forms, each with the offset that suits the record.
+    pub models: Vec<TransferFunction>,
+    /// Share of draws for which none was found, however near to the middle: the intervals know nothing of these.
+    pub lost: f64,
 }
 
 impl Identified {
-    /// Models that could as well be the true one: stable draws from the coefficients' distribution, each with the offset that
-    /// suits the record.
-    pub fn draws(&self, record: &Record, count: usize, random: &mut impl Rng) -> Vec<TransferFunction> {
-        let size = self.covariance.nrows();
-        // A tenth of a millionth more on the diagonal: rounding may have made the matrix indefinite.
-        let jittered = &self.covariance + DMatrix::from_diagonal(&self.covariance.diagonal()) * 1e-7;
-        let Some(root) = jittered.cholesky().map(|cholesky| cholesky.l()) else { return vec![self.model.clone(); count] };
-        let centre = coefficients(&self.model);
+    /// Draws from each member's distribution, in the number that its weight asks for. One that could not be the true one, because
+    /// it is unstable or leaves much more of the record, is drawn half as far from the middle, and again.
+    pub fn draws(&self, record: &Record, count: usize, random: &mut impl Rng) -> Draws {
+        let (mut all, mut weight) = (Draws { models: Vec::with_capacity(count), lost: 0.0 }, 0.0);
+        for member in &self.members {
+            weight += member.weight;
+            let wanted = ((weight * count as f64).round() as usize).min(count) - all.models.len();
+            let Draws { models, lost } = self.draws_of(member, record, wanted, random);
+            all.lost += lost * wanted as f64 / count as f64;
+            all.models.extend(models);
+        }
+        all
+    }
+
+    /// The same of one form.
+    pub fn draws_of(&self, member: &Member, record: &Record, count: usize, random: &mut impl Rng) -> Draws {
         let bound = WORSE * level(&mut self.model.clone(), record);
-        let mut draws = Vec::with_capacity(count);
-        for _ in 0..20 * count {
-            if draws.len() == count {
-                break;
-            }
-            let normal = DVector::from_fn(size, |_, _| StandardNormal.sample(random));
-            let mut model = self.model.with(&(&centre + &root * normal));
-            if is_stable(&model.denominator) {
-                let left = level(&mut model, record);
-                if left <= bound {
-                    draws.push(model);
-                }
-            }
+        let (root, centre) = (root(&member.covariance), coefficients(&member.model));
+        let (mut models, mut lost) = (Vec::with_capacity(count), 0usize);
+        for _ in 0..count {
+            let normal = DVector::from_fn(centre.len(), |_, _| StandardNormal.sample(random));
+            let mut away = &root * normal;
+            let found = (0..HALVINGS).find_map(|_| {
+                let mut model = member.model.with(&(&centre + &away));
+                away *= 0.5;
+                (is_stable(&model.denominator) && level(&mut model, record) <= bound).then_some(model)
+            });
+            lost += usize::from(found.is_none());
+            models.push(found.unwrap_or_else(|| self.model.clone()));
         }
-        draws.resize(count, self.model.clone());
-        draws
+        Draws { lost: lost as f64 / count.max(1) as f64, models }
     }
 }
 
-fn coefficients(model: &TransferFunction) -> DVector<f64> {
-    let values = model.numerator.iter().chain(&model.denominator[1..]).copied().chain([model.offset]);
-    DVector::from_vec(values.collect())
-}
-
-impl TransferFunction {
-    /// A model of the same form with other coefficients.
-    fn with(&self, coefficients: &DVector<f64>) -> Self {
-        let terms = self.numerator.len();
-        let values = coefficients.as_slice();
-        Self {
-            dead_time: self.dead_time,
-            numerator: values[..terms].to_vec(),
-            denominator: std::iter::once(1.0).chain(values[terms..values.len() - 1].iter().copied()).collect(),
-            offset: values[values.len() - 1],
-        }
-    }
-}
-
-impl Whitened {
-    fn new(record: &Record, arx: &Arx, longest: usize) -> Self {
-        let shortest = record.segments.iter().map(|segment| segment.measured.len()).min().unwrap_or(0);
-        let skipped = (arx.order + longest + 8).min(shortest / 4);
-        let segments = record.segments.iter().map(|segment| Segment {
-            reference: filter(&arx.whitening, &[1.0], &segment.reference),
-            measured: filter(&arx.whitening, &[1.0], &segment.measured),
-        });
-        let rows = record.segments.iter().map(|segment| segment.measured.len() - skipped).sum();
-        Self { segments: segments.collect(), level: arx.whitening.iter().sum(), skipped, rows }
-    }
-
-    fn fit(&self, order: usize, terms: usize, dead_time: usize) -> Option<Candidate> {
-        let form = TransferFunction { dead_time, numerator: vec![0.0; terms], denominator: vec![0.0; order + 1], offset: 0.0 };
-        let mut denominator = vec![1.0];
-        denominator.resize(order + 1, 0.0);
-        let mut found: Option<(f64, DVector<f64>)> = None;
-        for _ in 0..8 {
-            let solution = self.steiglitz_mcbride(&form, &denominator)?;
-            let mut model = form.with(&solution.coefficients);
-            for _ in 0..200 {
-                if is_stable(&model.denominator) {
-                    break;
-                }
-                // Poles are drawn towards zero until all are inside.
-                let mut factor = 1.0;
-                for c in &mut model.denominator {
-                    *c *= factor;
-                    factor *= 0.97;
-                }
-            }
-            if !is_stable(&model.denominator) {
-                return None;
-            }
-            let before = std::mem::replace(&mut denominator, model.denominator.clone());
-            let cost = self.cost(&model);
-            if found.as_ref().is_none_or(|(least, _)| cost < *least) {
-                found = Some((cost, coefficients(&model)));
-            }
-            if before.iter().zip(&denominator).all(|(a, b)| (a - b).abs() < 1e-5) {
-                break;
-            }
-        }
-        let (cost, start) = found?;
-        let (model, solution, cost) = self.polished(form.with(&start), cost)?;
-        let (rows, count) = (self.rows as f64, start.len() as f64);
-        let variance = (cost / (rows - count)).max(f64::MIN_POSITIVE);
-        Some(Candidate { covariance: solution.inverse * variance, model, criterion: rows * variance.ln() + count * rows.ln() })
-    }
-
-    /// One step: signals filtered by 1/F of the step before, then linear least squares.
-    fn steiglitz_mcbride(&self, form: &TransferFunction, denominator: &[f64]) -> Option<Solution> {
-        let (terms, order) = (form.numerator.len(), denominator.len() - 1);
-        let mut regression = Regression::new(terms + order + 1, 1);
-        let mut row = vec![0.0; terms + order + 1];
-        for segment in &self.segments {
-            let input = filter(&[1.0], denominator, &delayed(&segment.reference, form.dead_time));
-            let output = filter(&[1.0], denominator, &segment.measured);
-            for tick in self.skipped.max(terms.max(order))..output.len() {
-                for (lag, cell) in row[..terms].iter_mut().enumerate() {
-                    *cell = input[tick - lag];
-                }
-                for (lag, cell) in row[terms..terms + order].iter_mut().enumerate() {
-                    *cell = -output[tick - 1 - lag];
-                }
-                row[terms + order] = self.level;
-                regression.push(&row, &[output[tick]]);
-            }
-        }
-        regression.solve(1e-13)
-    }
-
-    fn simulated(&self, model: &TransferFunction, segment: &Segment) -> Vec<f64> {
-        filter(&model.numerator, &model.denominator, &delayed(&segment.reference, model.dead_time))
-    }
-
-    fn cost(&self, model: &TransferFunction) -> f64 {
-        let of = |segment: &Segment| -> f64 {
-            let simulated = self.simulated(model, segment);
-            let errors = segment.measured.iter().zip(&simulated).skip(self.skipped);
-            errors.map(|(y, simulated)| (y - simulated - model.offset * self.level).powi(2)).sum()
-        };
-        self.segments.iter().map(of).sum()
-    }
-
-    /// Levenberg-Marquardt on the whitened output error.
-    fn polished(&self, mut model: TransferFunction, mut cost: f64) -> Option<(TransferFunction, Solution, f64)> {
-        let mut damping = 1e-4;
-        let mut last = self.linearised(&model).solve(1e-13);
-        for _ in 0..12 {
-            let regression = self.linearised(&model);
-            let mut moved = false;
-            for _ in 0..5 {
-                let Some(step) = regression.solve(damping) else { break };
-                let trial = model.with(&(coefficients(&model) + step.coefficients));
-                let trial_cost = if is_stable(&trial.denominator) { self.cost(&trial) } else { f64::INFINITY };
-                if trial_cost < cost {
-                    moved = cost - trial_cost > 1e-6 * cost;
-                    (model, cost) = (trial, trial_cost);
-                    damping = (damping * 0.2).max(1e-12);
-                    break;
-                }
-                damping *= 8.0;
-            }
-            if !moved {
-                break;
-            }
-        }
-        last = self.linearised(&model).solve(1e-13).or(last);
-        Some((model, last?, cost))
-    }
-
-    /// The output error linearised in the coefficients.
-    fn linearised(&self, model: &TransferFunction) -> Regression {
-        let mut regression = Regression::new(coefficients(model).len(), 1);
-        self.gradients(model, |_, row, error| regression.push(row, &[error]));
-        regression
-    }
-
-    /// Row by row: the index of its segment and its own, what each coefficient does to the output, the output error.
-    fn gradients(&self, model: &TransferFunction, mut of_row: impl FnMut([usize; 2], &[f64], f64)) {
-        let (terms, order) = (model.numerator.len(), model.denominator.len() - 1);
-        let mut row = vec![0.0; terms + order + 1];
-        for (index, segment) in self.segments.iter().enumerate() {
-            let input = delayed(&segment.reference, model.dead_time);
-            let simulated = filter(&model.numerator, &model.denominator, &input);
-            let by_numerator = filter(&[1.0], &model.denominator, &input);
-            let by_denominator = filter(&[1.0], &model.denominator, &simulated);
-            for tick in self.skipped.max(terms.max(order))..simulated.len() {
-                for (lag, cell) in row[..terms].iter_mut().enumerate() {
-                    *cell = by_numerator[tick - lag];
-                }
-                for (lag, cell) in row[terms..terms + order].iter_mut().enumerate() {
-                    *cell = -by_denominator[tick - 1 - lag];
-                }
-                row[terms + order] = self.level;
-                of_row([index, tick], &row, segment.measured[tick] - simulated[tick] - model.offset * self.level);
-            }
-        }
-    }
-
-    /// Covariance of coefficients of a model that is not the whole truth: from the spread of the blocks' pulls on the
-    /// coefficients (Liang and Zeger, "Longitudinal data analysis using generalized linear models", Biometrika 73 (1986), blocks
-    /// for subjects), where that is more than white errors explain.
-    fn robust(&self, model: &TransferFunction, white: &DMatrix<f64>) -> DMatrix<f64> {
-        let length = (2 * model.settling()).max(self.rows / MOST_BLOCKS).max(1);
-        let size = white.nrows();
-        let mut blocks: Vec<([usize; 2], DVector<f64>)> = Vec::new();
-        self.gradients(model, |[segment, tick], row, error| {
-            let block = [segment, tick / length];
-            if blocks.last().is_none_or(|(last, _)| *last != block) {
-                blocks.push((block, DVector::zeros(size)));
-            }
-            let (_, pull) = blocks.last_mut().expect("a block was just pushed");
-            pull.iter_mut().zip(row).for_each(|(sum, gradient)| *sum += gradient * error);
-        });
-        let (rows, size) = (self.rows as f64, size as f64);
-        let Some(root) = white.clone().cholesky().map(|cholesky| cholesky.l()) else { return white.clone() };
-        let variance = self.cost(model) / (rows - size);
-        // In coordinates in which white errors make the sum of squares of the pulls the unit matrix.
-        let mut squares = DMatrix::zeros(white.nrows(), white.nrows());
-        for (_, pull) in &blocks {
-            let pull = root.tr_mul(pull) / variance;
-            squares.ger(1.0, &pull, &pull, 1.0);
-        }
-        // A log without any noise leaves nothing to tell a spread from.
-        if !squares.iter().all(|square: &f64| square.is_finite()) {
-            return white.clone();
-        }
-        // White errors seen in so few blocks reach to the edge of Marchenko and Pastur's law.
-        let edge = (1.0 + (size / blocks.len().max(1) as f64).sqrt()).powi(2);
-        let mut eigen = squares.symmetric_eigen();
-        eigen.eigenvalues.iter_mut().for_each(|value| *value = if *value > edge { *value } else { 1.0 });
-        &root * eigen.recompose() * root.transpose()
-    }
+/// A root of a covariance, which rounding may have made indefinite.
+fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    // In units of each coefficient's own deviation: they differ by many orders.
+    let scale = covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
+    let unit = DMatrix::from_fn(scale.len(), scale.len(), |i, j| {
+        let product = scale[i] * scale[j];
+        if product > 0.0 { covariance[(i, j)] / product } else { 0.0 }
+    });
+    let eigen = unit.symmetric_eigen();
+    let widths = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
+    DMatrix::from_diagonal(&scale) * eigen.eigenvectors * DMatrix::from_diagonal(&widths)
 }

@@ -34,6 +34,7 @@ pub mod digits;
 pub mod excitation;
 pub mod identification;
 pub mod least_squares;
+mod output_error;
 pub mod plausibility;
 pub mod polynomial;
 pub mod prediction;

@@ -32,6 +32,9 @@ pub struct Prediction {
     pub with_add_on: Interval,
     /// Reduction of the error, %; negative: worse.
     pub reduction_percent: Interval,
+    /// The same where what the model does not explain comes once, as it does if it is a disturbance from outside; 95 % of the draws
+    /// are above its lower end, and as many below its upper one: what the verdict is about.
+    pub undisturbed_percent: Interval,
     /// RMS that the noise alone leaves, in the output's unit.
     pub floor: f64,
 }
@@ -55,6 +58,8 @@ const TOLERANCE: f64 = 1.03;
 const WIDENING: f64 = 0.3;
 /// ...and by this much, in percentage points.
 const LEAST_WIDENING: f64 = 0.5;
+/// Share of draws beyond an end that alone is asked for.
+const ONE_SIDED: f64 = 0.05;
 /// Size in which what the model does not explain comes a second time, at worst.
 const AGAIN: f64 = std::f64::consts::SQRT_2;
 /// Most samples that are simulated in a draw.
@@ -106,16 +111,18 @@ pub fn predict(
     let twice = |error: f64| error.hypot(AGAIN * floor);
     let wider = |end: f64| end + (end - found.value) * WIDENING + (end - found.value).signum() * LEAST_WIDENING;
     let least = wider(found.low).min(found.value - LEAST_WIDENING);
+    let most = wider(found.high).max(found.value + LEAST_WIDENING).min(100.0);
     let with_add_on = Interval::of(error, outcomes.iter().map(|outcome| outcome.1));
     Some(Prediction {
         window,
         features,
         baseline: Interval::of(baseline, outcomes.iter().map(|outcome| outcome.0)),
         with_add_on: Interval { high: twice(with_add_on.high), ..with_add_on },
+        undisturbed_percent: Interval::without(ONE_SIDED, found.value, outcomes.iter().map(reduction)),
         reduction_percent: Interval {
             low: reduction(&(baseline, twice((1.0 - least / 100.0) * baseline))),
             value: found.value,
-            high: wider(found.high).max(found.value + LEAST_WIDENING).min(100.0),
+            high: most,
         },
         floor,
     })

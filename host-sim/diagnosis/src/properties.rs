@@ -3,10 +3,17 @@
 //! *in* an identified model and draws from its distribution; *out* [`Properties`]; *never* a value outside of its interval;
 //! *source* Zhou 2017, Insight 1 (relative degree, zero dynamics), Lemma 1 (gain).
 
-use nalgebra::DVector;
+use nalgebra::{Complex, DVector};
+use rand::SeedableRng as _;
+use rand_distr::{Distribution as _, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 
-use crate::{identification::Identified, record::Record, transfer_function::TransferFunction};
+use crate::{
+    identification::{Identified, Member},
+    record::Record,
+    transfer_function::TransferFunction,
+};
 
 /// A value with the interval that holds it with 95 % of the draws' weight.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -22,13 +29,25 @@ pub struct Interval {
 impl Interval {
     /// The middle 95 % of samples, widened so that it holds the value.
     pub fn of(value: f64, samples: impl IntoIterator<Item = f64>) -> Self {
+        Self::without(0.025, value, samples)
+    }
+
+    /// What is left of samples without this share of them at either end, widened so that it holds the value.
+    pub fn without(ends: f64, value: f64, samples: impl IntoIterator<Item = f64>) -> Self {
         let mut sorted: Vec<f64> = samples.into_iter().filter(|sample| sample.is_finite()).collect();
         sorted.sort_by(f64::total_cmp);
         let at = |share: f64| {
             let index = (share * sorted.len().saturating_sub(1) as f64).round() as usize;
             sorted.get(index).copied().unwrap_or(value)
         };
-        Self { low: at(0.025).min(value), value, high: at(0.975).max(value) }
+        Self { low: at(ends).min(value), value, high: at(1.0 - ends).max(value) }
+    }
+
+    /// The interval with half widths that are longer by a share of them and by an amount.
+    #[must_use]
+    pub fn wider(self, share: f64, amount: f64) -> Self {
+        let wider = |end: f64, sign: f64| end + (end - self.value) * share + sign * amount;
+        Self { low: wider(self.low, -1.0), value: self.value, high: wider(self.high, 1.0) }
     }
 
     /// Whether a value lies inside.
@@ -110,6 +129,12 @@ pub struct Properties {
 pub const THRESHOLD: f64 = 0.1;
 /// A reversal smaller than this share of the end is no reversal.
 const LEAST_REVERSAL: f64 = 0.02;
+/// What draws cannot know, since no model of few coefficients at a sub-rate has the loop's own form, widens intervals of lag and
+/// bandwidth by this share of their half widths...
+const FORM: f64 = 0.3;
+/// ...and by this much of a tick, and of the bandwidth.
+const FORM_TICKS: f64 = 0.03;
+const FORM_BANDWIDTH: f64 = 0.003;
 /// Longest step response that is looked at, ticks.
 const HORIZON: usize = 400;
 
@@ -126,6 +151,9 @@ impl Properties {
         };
         let horizon = (model.settling() + 20).min(HORIZON);
         let (noise, explained) = fit(identified, record);
+        let bandwidth_hz = over(&|model| model.bandwidth() / (std::f64::consts::TAU * period_s));
+        let Interval { low, high, .. } = bandwidth_hz.wider(FORM, FORM_BANDWIDTH * bandwidth_hz.value);
+        let half_hz = 0.5 / period_s;
         let reversals = |model: &TransferFunction| reversal(model, horizon).0;
         Self {
             strict_degree: strict(identified),
@@ -135,8 +163,8 @@ impl Properties {
             reversal: over(&reversals),
             reversal_ticks: reversal(model, horizon).1,
             zeros: zeros(model, draws, period_s),
-            lag_s: over(&|model| model.lag() * period_s),
-            bandwidth_hz: over(&|model| model.bandwidth() / (std::f64::consts::TAU * period_s)),
+            lag_s: over(&|model| model.lag() * period_s).wider(FORM, FORM_TICKS * period_s),
+            bandwidth_hz: Interval { low: low.max(0.5 * bandwidth_hz.low), high: high.min(half_hz), ..bandwidth_hz },
             settling_s: model.settling() as f64 * period_s,
             noise,
             explained,
@@ -144,22 +172,31 @@ impl Properties {
     }
 }
 
-/// The gain, and 95 % of it by the coefficients' covariance, linearised: draws of coefficients whose poles nearly cancel zeros
-/// leave the valley in which the data hold them, and their gains with it. Below `angle`, in radians a sample, the record shows
-/// nothing.
+/// Samples of the gain of all members.
+const GAINS: usize = 2000;
+
+/// The gain, and 95 % of it by each member's covariance, linearised: draws of coefficients whose poles nearly cancel zeros leave
+/// the valley in which the data hold them, and their gains with it. Below `angle`, in radians a sample, the record shows nothing.
 fn gain(identified: &Identified, angle: f64) -> Interval {
-    let Identified { model, covariance, .. } = identified;
-    let value = model.gain();
-    let sum: f64 = model.denominator.iter().sum();
-    let (terms, order) = (model.numerator.len(), model.denominator.len() - 1);
-    let slope = DVector::from_fn(covariance.nrows(), |index, _| match index {
-        _ if index < terms => 1.0 / sum,
-        _ if index < terms + order => -value / sum,
-        _ => 0.0,
-    });
-    let extrapolated = coloured(&identified.noise) * (model.response(angle).norm() - value.abs()).abs();
-    let reach = 1.96 * slope.dot(&(covariance * &slope)).max(0.0).sqrt() + extrapolated;
-    Interval { low: value - reach, value, high: value + reach }
+    let value = identified.model.gain();
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
+    let mut samples = Vec::with_capacity(GAINS);
+    for Member { weight, model, covariance } in &identified.members {
+        let value = model.gain();
+        let sum: f64 = model.denominator.iter().sum();
+        let (terms, order) = (model.numerator.len(), model.order());
+        let slope = DVector::from_fn(covariance.nrows(), |index, _| match index {
+            _ if index < terms => 1.0 / sum,
+            _ if index < terms + order => -value / sum,
+            _ => 0.0,
+        });
+        let deviation = slope.dot(&(covariance * &slope)).max(0.0).sqrt();
+        let wanted = (weight * GAINS as f64).round() as usize;
+        samples.extend(StandardNormal.sample_iter(&mut random).take(wanted).map(|normal: f64| value + deviation * normal));
+    }
+    let Interval { low, high, .. } = Interval::of(value, samples);
+    let extrapolated = coloured(&identified.noise) * (identified.model.response(angle).norm() - value.abs()).abs();
+    Interval { low: low - extrapolated, value, high: high + extrapolated }
 }
 
 /// Share of the errors' variance that the error before tells, 0 to 1.
@@ -210,7 +247,7 @@ fn zeros(model: &TransferFunction, draws: &[TransferFunction], period_s: f64) ->
         .map(|zero| {
             // In each draw the zero nearest to this one, seen from the origin by the ratio: 0.5 and 2 are as far from 1.
             let nearest = of_draws.iter().filter_map(|zeros| {
-                let distance = |other: &nalgebra::Complex<f64>| (other - zero).norm() / (other.norm() + zero.norm());
+                let distance = |other: &Complex<f64>| (other - zero).norm() / (other.norm() + zero.norm());
                 zeros.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).map(|other| other.norm())
             });
             let magnitudes: Vec<f64> = nearest.collect();
@@ -224,11 +261,16 @@ fn zeros(model: &TransferFunction, draws: &[TransferFunction], period_s: f64) ->
                 re: zero.re,
                 im: zero.im,
                 magnitude: Interval::of(zero.norm(), magnitudes),
-                frequency_hz: zero.ln().norm() / (std::f64::consts::TAU * period_s),
+                frequency_hz: frequency_hz(zero, period_s),
                 place,
             }
         })
         .collect()
+}
+
+/// Natural frequency of a zero, Hz.
+pub(crate) fn frequency_hz(zero: Complex<f64>, period_s: f64) -> f64 {
+    zero.ln().norm() / (std::f64::consts::TAU * period_s)
 }
 
 fn fit(identified: &Identified, record: &Record) -> (f64, f64) {

@@ -181,15 +181,17 @@ impl Record {
         Self { period_s: self.period_s * divisor as f64, segments: segments.collect() }
     }
 
-    /// The first stretches, `samples` at most and one at least.
+    /// Of each stretch the first part, `samples` in all at most; no part is shorter than [`FEWEST_ROWS`], if its stretch is not.
     #[must_use]
     pub fn shorter(mut self, samples: usize) -> Self {
-        let mut count = 0;
-        self.segments.retain(|segment| {
-            let fits = count == 0 || count + segment.reference.len() <= samples;
-            count += if fits { segment.reference.len() } else { 0 };
-            fits
-        });
+        let all = self.len();
+        if all > samples {
+            for Segment { reference, measured } in &mut self.segments {
+                let kept = (reference.len() * samples / all).max(FEWEST_ROWS);
+                reference.truncate(kept);
+                measured.truncate(kept);
+            }
+        }
         self
     }
 }

@@ -25,26 +25,37 @@ impl Diagnosis {
                 let why = self.gates.unit_gain.why().unwrap_or_default();
                 text += &format!(": {why}; predicted reduction of the RMS error {reduction}");
             }
+            Verdict::WillHelpByWindow => {
+                let why = self.gates.stable_inverse.why().unwrap_or_default();
+                text += &format!(
+                    ": {why}. A window over the desired output stays bounded all the same; predicted reduction of the RMS error \
+                     {reduction}"
+                );
+            }
             Verdict::WillNot => {
-                for gate in [&self.gates.stable_inverse, &self.gates.excitation] {
-                    if let Gate::Failed(why) = gate {
-                        text += &format!(": {why}");
-                    }
-                }
-                if let Gate::Failed(_) = self.gates.stable_inverse {
-                    text += &format!(
-                        ". Not the inverse, but a window over the desired output alone stays bounded; its predicted reduction \
-                         is {reduction}"
-                    );
-                } else if prediction.reduction_percent.value < LEAST_REDUCTION {
-                    text += &format!(
-                        ": there is little to gain; predicted reduction {reduction}, noise alone leaves {:.3e} of {:.3e} RMS",
-                        prediction.floor, prediction.baseline.value
-                    );
-                }
+                text += &format!(
+                    ": there is little to gain; predicted reduction {reduction}, noise alone leaves {:.3e} of {:.3e} RMS",
+                    prediction.floor, prediction.baseline.value
+                );
+            }
+            Verdict::CannotTell => {
+                text += &format!(": the log leaves a reduction of {reduction} possible; {}", self.next());
             }
         }
         text
+    }
+
+    /// What to log next, where this one does not decide: longer by the square of what its interval is too wide by, or larger by as
+    /// much, since the noise stays as it is.
+    fn next(&self) -> String {
+        let Interval { low, value, high } = self.prediction.undisturbed_percent;
+        let wide = if value >= LEAST_REDUCTION { value - low } else { high - value };
+        let factor = (wide / (value - LEAST_REDUCTION).abs().max(0.1)).clamp(1.2, 10.0);
+        let what = match &self.gates.excitation {
+            Gate::Passed => String::new(),
+            Gate::Undecided(why) | Gate::Failed(why) => format!("; {why}"),
+        };
+        format!("log {} times as long, or with {} times the amplitude{what}", digits(factor * factor), digits(factor))
     }
 
     /// The lines as text for a terminal, broken at 130 characters.
@@ -80,13 +91,6 @@ impl Diagnosis {
             if let Gate::Undecided(why) = gate {
                 lines.push(line("undecided", why.clone()));
             }
-        }
-        let reduction = prediction.reduction_percent;
-        if reduction.value >= LEAST_REDUCTION && reduction.low < LEAST_REDUCTION {
-            let why = "the predicted reduction reaches down to harm: the log leaves too many models; a longer or quieter one, \
-            or a slower \
-                       --sub-rate, decides";
-            lines.push(line("undecided", why.into()));
         }
         let features = match prediction.features {
             Features::Relative => "relative to now (difference learning)",

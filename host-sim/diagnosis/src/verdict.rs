@@ -1,15 +1,18 @@
 //! From properties to gates, and from gates to a verdict.
 //!
-//! *in* properties, coverage, prediction; *out* [`Gates`], [`Verdict`]; *never* "will help" while a gate failed; *source* Zhou
-//! 2017, Insight 1b (stable inverse), Lemma 1 (unit gain), Section III (excitation).
+//! *in* properties, coverage, prediction; *out* [`Gates`], [`Verdict`]; *never* more than the log shows: what it leaves open is
+//! said to be open, with what to log next; *source* Zhou 2017, Insight 1b (stable inverse), Lemma 1 (unit gain), Section III
+//! (excitation). What differs: an unstable inverse is not the end, since a window over the desired output stays bounded.
 
+use nalgebra::Complex;
 use serde::Serialize;
 
 use crate::{
     digits::digits,
     excitation::Coverage,
     prediction::Prediction,
-    properties::{Place, Properties, Zero},
+    properties::{Interval, Place, Properties, Zero, frequency_hz},
+    transfer_function::TransferFunction,
 };
 
 /// Outcome of one gate.
@@ -35,7 +38,7 @@ pub struct Gates {
     pub excitation: Gate,
 }
 
-/// Whether an add-on that learns the loop's inverse will help.
+/// Whether an add-on on the references will help.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -43,24 +46,35 @@ pub enum Verdict {
     WillHelp,
     /// It will, if inputs and outputs are absolute.
     WillHelpWithoutDifferenceLearning,
-    /// It will not.
+    /// A window over the desired output will; an inverse that feeds itself back is unstable, or not shown to be stable.
+    WillHelpByWindow,
+    /// It will not: there is too little to gain.
     WillNot,
+    /// The log leaves both open.
+    CannotTell,
 }
 
 /// A gain this near to one is one.
 pub const GAIN_TOLERANCE: f64 = 0.03;
 /// Least share of the loop's band that has to be excited.
 const LEAST_COVERAGE: f64 = 0.5;
-/// A predicted reduction below this, %, is none; one whose interval reaches below is stated as undecided.
+/// A reduction below this, %, is none.
 pub const LEAST_REDUCTION: f64 = 5.0;
+/// Share of draws that may have been lost.
+const MOST_LOST: f64 = 0.5;
+/// Share of draws that decides where a zero lies.
+const SURE: f64 = 0.95;
+/// Where a model explains less than this share of what was measured, the rest may hide a zero that it lacks.
+const LEAST_EXPLAINED: f64 = 0.9;
 
 impl Gates {
-    /// The gates of a channel that was identified at twice `half_rate_hz`.
-    pub fn of(properties: &Properties, coverage: &Coverage, half_rate_hz: f64) -> Self {
+    /// The gates of a channel that was identified at this sub-rate; the models are draws of those
+    /// that could be the true one, and rivals that no test rules out.
+    pub fn of(properties: &Properties, coverage: &Coverage, models: [&[TransferFunction]; 2], sub_rate_hz: f64) -> Self {
         Self {
             unit_gain: unit_gain(properties),
-            stable_inverse: stable_inverse(properties, coverage),
-            excitation: excitation(properties, coverage, half_rate_hz),
+            stable_inverse: stable_inverse(properties, coverage, models, sub_rate_hz),
+            excitation: excitation(properties, coverage, 0.5 * sub_rate_hz),
         }
     }
 
@@ -68,7 +82,7 @@ impl Gates {
     pub fn failures(&self, difference_learning: bool) -> Vec<&str> {
         let gain = difference_learning.then_some(&self.unit_gain);
         let failed = |gate: &&Gate| matches!(gate, Gate::Failed(_));
-        gain.into_iter().chain([&self.stable_inverse, &self.excitation]).filter(failed).filter_map(Gate::why).collect()
+        gain.into_iter().chain([&self.stable_inverse]).filter(failed).filter_map(Gate::why).collect()
     }
 }
 
@@ -83,11 +97,16 @@ impl Gate {
 }
 
 impl Verdict {
-    /// The verdict of gates and of a prediction for the features that the gates allow.
-    pub fn of(gates: &Gates, prediction: &Prediction) -> Self {
-        let failed = |gate: &Gate| matches!(gate, Gate::Failed(_));
-        if failed(&gates.stable_inverse) || failed(&gates.excitation) || prediction.reduction_percent.value < LEAST_REDUCTION {
+    /// The verdict of gates and of a prediction for the features that the gates allow. Where most draws were `lost`, the
+    /// intervals know nothing.
+    pub fn of(gates: &Gates, prediction: &Prediction, lost: f64) -> Self {
+        let Interval { low, high, .. } = prediction.undisturbed_percent;
+        if high < LEAST_REDUCTION {
             Self::WillNot
+        } else if low < LEAST_REDUCTION || lost > MOST_LOST {
+            Self::CannotTell
+        } else if gates.stable_inverse != Gate::Passed {
+            Self::WillHelpByWindow
         } else if gates.unit_gain == Gate::Passed {
             Self::WillHelp
         } else {
@@ -100,7 +119,9 @@ impl Verdict {
         match self {
             Self::WillHelp => "will help",
             Self::WillHelpWithoutDifferenceLearning => "will help without difference learning",
+            Self::WillHelpByWindow => "will help by a window over the desired output",
             Self::WillNot => "will not help",
+            Self::CannotTell => "cannot tell",
         }
     }
 }
@@ -124,30 +145,66 @@ fn unit_gain(properties: &Properties) -> Gate {
 
 /// A zero further out than this is a dead time that is a tick longer, up to a tenth of the first coefficient: preview undoes it.
 pub const FAR: f64 = 10.0;
+/// The same where a zero is not sure: nothing says then that the first coefficient is one at all.
+const NEAR: f64 = 3.0;
 
+/// What the record shows tells of zeros up to so many times its highest frequency.
+const SMOOTH: f64 = 1.4;
 /// A smooth trajectory asks nothing of the inverse at so many times the bandwidth.
 const JUDGED: f64 = 10.0;
 
-/// Zeros that are judged: at frequencies that the record shows (at faster ones neither the log nor a smooth trajectory asks
-/// anything of the inverse), up to ten times the bandwidth, and not [`FAR`] out.
-pub fn judged_zeros<'a>(properties: &'a Properties, coverage: &Coverage) -> impl Iterator<Item = &'a Zero> + use<'a> {
-    let highest = (1.02 * coverage.highest_hz).min(JUDGED * properties.bandwidth_hz.value);
-    properties.zeros.iter().filter(move |zero| zero.frequency_hz <= highest && zero.magnitude.value < FAR)
+/// Frequencies, Hz, up to which a zero is judged: wherever it lies, and if it surely lies outside. The first is what the record
+/// shows (at faster ones neither the log nor a smooth trajectory asks anything of the inverse), but the loop's own band at least;
+/// the second is ten times that band.
+fn judged_hz(properties: &Properties, coverage: &Coverage) -> [f64; 2] {
+    let band = properties.bandwidth_hz.value.min(coverage.trusted_hz);
+    let reach = (JUDGED * band).min(coverage.trusted_hz);
+    [(SMOOTH * coverage.highest_hz).clamp(band, reach), reach]
 }
 
-fn stable_inverse(properties: &Properties, coverage: &Coverage) -> Gate {
-    let list = |place: Place| {
-        let zeros = judged_zeros(properties, coverage).filter(|zero| zero.place == place);
-        zeros.map(Zero::words).collect::<Vec<_>>().join(", ")
+/// Zeros that are judged, those that are not [`FAR`] out.
+pub fn judged_zeros<'a>(properties: &'a Properties, coverage: &Coverage) -> impl Iterator<Item = &'a Zero> + use<'a> {
+    let [shown, reach] = judged_hz(properties, coverage);
+    let judged = move |zero: &&Zero| zero.frequency_hz <= if zero.place == Place::Outside { reach } else { shown };
+    properties.zeros.iter().filter(judged).filter(|zero| zero.magnitude.value < FAR)
+}
+
+fn stable_inverse(
+    properties: &Properties,
+    coverage: &Coverage,
+    [draws, rivals]: [&[TransferFunction]; 2],
+    sub_rate_hz: f64,
+) -> Gate {
+    let [shown, reach] = judged_hz(properties, coverage);
+    let outside = |model: &TransferFunction, highest: f64, far: f64| {
+        let unstable = |zero: &Complex<f64>| {
+            (1.0..far).contains(&zero.norm()) && frequency_hz(*zero, 1.0 / sub_rate_hz) <= highest
+        };
+        model.zeros().iter().any(unstable)
     };
-    let (outside, undecided) = (list(Place::Outside), list(Place::Undecided));
-    if !outside.is_empty() {
+    let share = |highest: f64, far: f64| {
+        draws.iter().filter(|model| outside(model, highest, far)).count() as f64 / draws.len().max(1) as f64
+    };
+    let [of_shown, of_all] = [share(shown, NEAR), share(reach, FAR)];
+    let zeros: Vec<String> =
+        judged_zeros(properties, coverage).filter(|zero| zero.place != Place::Inside).map(Zero::words).collect();
+    let seen = !zeros.is_empty();
+    let zeros = if zeros.is_empty() { String::new() } else { format!(", z = {}", zeros.join(", ")) };
+    if seen && of_all >= SURE && rivals.iter().all(|rival| outside(rival, reach, FAR)) {
         Gate::Failed(format!(
-            "zero outside of the unit circle, z = {outside}: the inverse is unstable, its reference grows without bound"
+            "zero outside of the unit circle{zeros}: the inverse is unstable, its reference grows without bound"
         ))
-    } else if !undecided.is_empty() {
+    } else if of_shown > 1.0 - SURE || of_all >= SURE || rivals.iter().any(|rival| outside(rival, shown, NEAR)) {
         Gate::Undecided(format!(
-            "zero z = {undecided} may lie on either side of the unit circle; a longer or quieter log decides"
+            "a zero may lie outside of the unit circle{zeros} ({:.0} % of the models that could be true have one there): a longer \
+             or quieter log decides",
+            100.0 * of_shown
+        ))
+    } else if properties.explained < LEAST_EXPLAINED {
+        Gate::Undecided(format!(
+            "disturbances make up {:.0} % of what was measured and may hide a zero outside of the unit circle: a longer log, or one \
+             of larger amplitude, decides",
+            100.0 * (1.0 - properties.explained)
         ))
     } else {
         Gate::Passed
@@ -171,10 +228,11 @@ fn excitation(properties: &Properties, coverage: &Coverage, half_rate_hz: f64) -
             digits(coverage.highest_hz)
         ))
     } else {
-        Gate::Failed(format!(
-            "the reference shows only {percent:.0} % of the loop's band (0 … {} Hz) above the noise: fly steps, or many \
-             tones up to there",
-            digits(bandwidth_hz)
+        Gate::Undecided(format!(
+            "the reference shows only {percent:.0} % of the loop's band (0 … {} Hz) above the noise, and nothing above {} Hz: for \
+             faster motions, log steps, or many tones up to there",
+            digits(bandwidth_hz),
+            digits(coverage.highest_hz)
         ))
     }
 }
