@@ -12,9 +12,9 @@ use crate::{
     excitation::{self, Coverage},
     identification::{Draws, Identified, identify},
     plausibility::moves,
-    prediction::{Prediction, predict, window},
+    prediction::{Prediction, predict, root_mean_square, window},
     properties::Properties,
-    record::{FEWEST_ROWS, Record, RecordError},
+    record::{FEWEST_ROWS, Record, RecordError, Segment},
     transfer_function::TransferFunction,
     verdict::{Gate, Gates, Verdict},
 };
@@ -104,6 +104,8 @@ pub struct Diagnosis {
     pub sub_rate_hz: f64,
     /// Samples at that rate.
     pub samples: usize,
+    /// RMS of reference minus measured value in the log itself, in the output's unit.
+    pub logged_error: f64,
     /// Identified model.
     pub model: TransferFunction,
     /// Properties.
@@ -174,7 +176,7 @@ pub fn assess(record: &Record, settings: &Settings) -> Result<Assessment, Diagno
         Some(asked) => return assess_at(record, (rate_hz / asked).round().max(1.0) as usize, settings),
         None => record.longest() / FEWEST_ROWS,
     };
-    let first = excitation::divisor(record, SAMPLES_A_PERIOD, MOST_SAMPLES);
+    let first = excitation::divisor(record, SAMPLES_A_PERIOD);
     let found = assess_at(record, first, settings);
     // What a log shows may drown at a high rate, in noise or in rounding.
     let too_fast = |found: &Result<Assessment, DiagnosisError>| {
@@ -241,6 +243,7 @@ pub fn diagnose(record: &Record, settings: &Settings) -> Result<Diagnosis, Diagn
         rate_hz,
         sub_rate_hz,
         samples: record.len(),
+        logged_error: logged_error(&record),
         verdict: Verdict::of(&gates, &prediction, draws.lost),
         recommended_sub_rate_hz: sub_rate_hz / recommended as f64,
         recommended_preview_s: best.preview as f64 * record.period_s,
@@ -251,6 +254,12 @@ pub fn diagnose(record: &Record, settings: &Settings) -> Result<Diagnosis, Diagn
         gates,
         prediction,
     })
+}
+
+/// RMS of reference minus measured value.
+fn logged_error(record: &Record) -> f64 {
+    let error = |segment: &Segment| -> Vec<f64> { segment.reference.iter().zip(&segment.measured).map(|(u, y)| u - y).collect() };
+    root_mean_square(record.segments.iter().flat_map(error))
 }
 
 /// Four evaluations in the time by which the loop lags, and five in the shortest period that it passes: with interpolation

@@ -166,24 +166,19 @@ fn band_at_any_rate(record: &Record) -> Option<f64> {
     })
 }
 
-/// Ticks of the sub-rate by which a loop lags, at least: with fewer its lag is a matter of the form of the model.
-const LAG: f64 = 8.0;
-/// The same where the log is too short to show a band.
-const LAG_ALONE: f64 = 16.0;
-/// Rows of a tick from which the lag is taken.
-const FINER: usize = 8;
-/// Where no band says how long a tick may be, it is this part of the longest stretch at first.
+/// Where the log is too short to show a band, the loop lags by so many ticks.
+const LAG: f64 = 16.0;
+/// This part of the longest stretch is looked at then for the lag.
 const SPAN: usize = 200;
 
-/// How many rows of a record make a tick of the add-on: the band is `samples_a_period` times slower at most, and the loop lags by
-/// [`LAG`] ticks at least so far as `most` samples allow.
-pub fn divisor(record: &Record, samples_a_period: f64, most: usize) -> usize {
-    let of_band = band_at_any_rate(record).map(|band| 1.0 / (samples_a_period * band * record.period_s));
-    let (span, ticks) = of_band.map_or((record.longest() / SPAN, LAG_ALONE), |rows| (rows as usize, LAG));
-    let fine = (span / FINER).max(1);
-    let of_lag = (lag(&record.slower(fine), 40 * (span / fine).max(1), centred) * fine) as f64 / ticks;
-    let affordable = record.len().div_ceil(most);
-    of_band.unwrap_or(of_lag).min(of_lag.max(affordable as f64)).max(1.0) as usize
+/// How many rows of a record make a tick of the add-on: `samples_a_period` ticks in a period of the band.
+pub fn divisor(record: &Record, samples_a_period: f64) -> usize {
+    let rows = band_at_any_rate(record).map(|band| 1.0 / (samples_a_period * band * record.period_s));
+    let of_lag = || {
+        let fine = (record.longest() / SPAN / 8).max(1);
+        (lag(&record.slower(fine), SPAN, centred) * fine) as f64 / LAG
+    };
+    rows.unwrap_or_else(of_lag).max(1.0) as usize
 }
 
 /// Share of the reference's variance that lies at the lowest frequency and below.

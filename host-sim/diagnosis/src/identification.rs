@@ -106,8 +106,7 @@ pub fn identify(record: &Record) -> Option<Identified> {
     let step = (longest / TRIED).max(2);
     let dead_times = (0..=LONGEST_DEAD_TIME).chain((LONGEST_DEAD_TIME + step..=longest).step_by(step));
     let first = [[2, 1], [2, 2], [3, 3]];
-    let mut candidates =
-        fits(dead_times.flat_map(|dead_time| first.map(|[order, terms]| [order, terms, dead_time])).collect());
+    let mut candidates = fits(dead_times.flat_map(|dead_time| first.map(|[order, terms]| [order, terms, dead_time])).collect());
     let near = candidates[best(&candidates)?].model.dead_time;
     let near = near.saturating_sub(step)..=near + step;
     let tried = |candidates: &[Candidate], form: &[usize; 3]| candidates.iter().any(|candidate| candidate.form() == *form);
@@ -159,12 +158,13 @@ pub fn identify(record: &Record) -> Option<Identified> {
 fn members(whitened: &Whitened, candidates: &[Candidate], chosen: usize) -> (Vec<Member>, Vec<TransferFunction>) {
     let of_chosen = &candidates[chosen];
     let robust = whitened.robust(of_chosen);
-    let spread = of_chosen.covariance.clone().cholesky().map_or(1.0, |white| (white.inverse() * &robust).trace() / of_chosen.size());
+    let spread =
+        of_chosen.covariance.clone().cholesky().map_or(1.0, |white| (white.inverse() * &robust).trace() / of_chosen.size());
     let deviance = |candidate: &Candidate| candidate.deviance / spread.max(1.0);
     let smallest = candidates.iter().map(deviance).fold(f64::INFINITY, f64::min);
-    let rivals = candidates.iter().filter(|candidate| {
-        deviance(candidate) <= smallest + RIVAL && candidate.size() <= of_chosen.size() + RIVAL_SIZE
-    });
+    let rivals = candidates
+        .iter()
+        .filter(|candidate| deviance(candidate) <= smallest + RIVAL && candidate.size() <= of_chosen.size() + RIVAL_SIZE);
     let rivals = rivals.map(|candidate| candidate.model.clone()).collect();
     let akaike = |candidate: &Candidate| deviance(candidate) + 2.0 * candidate.size();
     let least = candidates.iter().map(akaike).fold(f64::INFINITY, f64::min);

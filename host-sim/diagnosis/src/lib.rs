@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! record ──► sub-rate ──► high-order ARX ──► transfer function, covariance ──► properties ──► gates ──► verdict
-//!                            (whitens)          (order, dead time by BIC)          │                      ▲
+//!                            (whitens)     (forms that could be true, by AIC)       │                      ▲
 //!                                                                                  └──► prediction ───────┘
 //! ```
 //!
@@ -19,7 +19,8 @@
 //! | 1 | `plausibility`, `digits` | whether columns can be what they are taken for; numbers for people |
 //! | 2 | `transfer_function`, `least_squares` | a rational function of z; the regression with its covariance |
 //! | 3 | `arx`, `excitation`, `add_on` | lagged regressors; what the log can tell at all; the add-on that is assumed |
-//! | 4 | `identification` | order, dead time, model and covariance |
+//! | 4 | `output_error` | a model of one form, its likelihood and covariance |
+//! | 4 | `identification` | order, dead time, the forms that the log does not rule out |
 //! | 5 | `properties` | gain, zeros, relative degree, lag, each with its interval |
 //! | 6 | `prediction` | by how much the error will shrink |
 //! | 7 | `verdict` | gates and what they come to |

@@ -10,10 +10,17 @@
 //! | whole numbers as time, a unit or more apart | refused, unless the column is ULog's `timestamp` or the unit is stated |
 //! | the measured value jumps by 360° or 2 pi within a row and hardly moves else | both columns unwrapped |
 //! | up to three samples in a row, far out of what the rest spans | a line between their neighbours |
+//! | at an end the reference rests, and the measured value rests elsewhere or leaps from there | left out, as time on the ground |
+//! | steps of time differ, or rows are lost | brought to one rate by straight lines |
 //! | the measured value is the reference | refused |
+//! | the measured value is 1000, 100, 57.3 times as large as the reference, or as small | refused, unless its unit is stated |
 //! | the measured value goes against the reference | refused, unless it is stated to count the other way |
 
+mod stretches;
+
 use std::f64::consts::TAU;
+
+use stretches::{airborne, evened};
 
 /// Unit of a column of time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,12 +48,14 @@ impl TimeUnit {
 }
 
 /// What is stated about a log; where nothing is, the log has to tell.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reading {
     /// Unit of the time.
     pub time_unit: Option<TimeUnit>,
     /// The measured value counts against the reference.
     pub negated: bool,
+    /// What the measured value is multiplied by to have the reference's unit.
+    pub scale: Option<f64>,
 }
 
 /// Columns of a log.
@@ -96,6 +105,17 @@ pub enum Implausible {
         /// Largest correlation in magnitude over the lags that were tried.
         correlation: f64,
     },
+    /// Another unit.
+    #[error(
+        "the measured value is {ratio:.4} times as large as the reference and goes with it: {units}? Say with --measured-scale what \
+         makes it the reference's unit (1 if it is)"
+    )]
+    Unit {
+        /// How many times.
+        ratio: f64,
+        /// What that could be.
+        units: &'static str,
+    },
     /// Too many wild samples.
     #[error("line {line} and {more} more: far out of what the rest spans; repair the log, or cut it there")]
     Wild {
@@ -109,7 +129,7 @@ pub enum Implausible {
 impl Implausible {
     /// Whether an option settles it.
     pub fn leaves_open(&self) -> bool {
-        matches!(self, Self::TimeUnit { .. } | Self::Same | Self::Against { .. })
+        matches!(self, Self::TimeUnit { .. } | Self::Same | Self::Against { .. } | Self::Unit { .. })
     }
 }
 
@@ -124,13 +144,19 @@ pub fn plausible(columns: Columns, name: &str, reading: &Reading) -> Result<(Col
     if columns.reference == columns.measured && moves(&columns.measured) {
         return Err(Implausible::Same);
     }
-    if reading.negated {
-        columns.measured.iter_mut().chain(columns.rate.iter_mut().flatten()).for_each(|value| *value = -*value);
+    let scale = reading.scale.unwrap_or(1.0) * if reading.negated { -1.0 } else { 1.0 };
+    if scale != 1.0 {
+        columns.measured.iter_mut().chain(columns.rate.iter_mut().flatten()).for_each(|value| *value *= scale);
     }
     unwrap(&mut columns, &mut notes);
     tame(&mut columns, &mut notes)?;
-    against(&columns)?;
-    Ok((columns, notes))
+    let columns = airborne(columns, &mut notes);
+    let alike = alike(&columns);
+    against(alike)?;
+    if reading.scale.is_none() {
+        unit(&columns, alike)?;
+    }
+    Ok((evened(columns, &mut notes), notes))
 }
 
 /// Whether a column is not the same number throughout.
@@ -197,6 +223,8 @@ fn in_seconds(columns: &mut Columns, name: &str, stated: Option<TimeUnit>, notes
 /// A wrap is within this share of a whole turn, and nothing else moves by more than the other share of one.
 const WRAP: f64 = 0.06;
 const STILL: f64 = 0.2;
+/// A wrapped angle is within its turn but for rounding, as a share of the turn.
+const ROUNDED: f64 = 2e-3;
 
 /// Unwraps an angle: a measured one that jumps by a turn and hardly moves else is one, and so is its reference.
 fn unwrap(columns: &mut Columns, notes: &mut Vec<String>) {
@@ -207,7 +235,11 @@ fn unwrap(columns: &mut Columns, notes: &mut Vec<String>) {
             let step = pair[1] - pair[0];
             if near(step, turn) { jumps += 1 } else { others |= step.abs() > STILL * turn }
         }
-        let within = columns.measured.iter().all(|value| (-0.52 * turn..=1.02 * turn).contains(value));
+        // It was wrapped when it was logged, so that its range is exact.
+        let within = [-0.5, 0.0].into_iter().any(|low| {
+            let range = (low - ROUNDED) * turn..=(low + 1.0 + ROUNDED) * turn;
+            columns.measured.iter().all(|value| range.contains(value))
+        });
         (jumps > 0 && !others && within).then_some(turn)
     };
     let Some(turn) = [360.0, TAU].into_iter().find_map(is_angle) else { return };
@@ -280,11 +312,10 @@ const AGAINST: f64 = -0.7;
 const LAGS: usize = 40;
 const LOOKED_AT: usize = 4000;
 
-/// A loop that follows its reference, however late, is not for long on its other side.
-fn against(columns: &Columns) -> Result<(), Implausible> {
+/// Least and largest correlation of the measured value with the reference before it, over the lags that are tried.
+fn alike(columns: &Columns) -> [f64; 2] {
     let rows = columns.measured.len();
     let step = (rows / LOOKED_AT).max(1);
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
     let (of_reference, of_measured) = (mean(&columns.reference), mean(&columns.measured));
     let correlation = |lag: usize| {
         let pairs = columns.reference.iter().zip(columns.measured.get(lag..).unwrap_or_default()).step_by(step);
@@ -299,8 +330,38 @@ fn against(columns: &Columns) -> Result<(), Implausible> {
     };
     // As far as a twentieth of the log.
     let found = (0..LAGS).map(|lag| correlation(lag * rows / (20 * LAGS)));
-    let (least, most) = found.fold((0.0f64, 0.0f64), |(least, most), value| (least.min(value), most.max(value)));
+    found.fold([0.0, 0.0], |[least, most], value| [value.min(least), value.max(most)])
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// A loop that follows its reference, however late, is not for long on its other side.
+fn against([least, most]: [f64; 2]) -> Result<(), Implausible> {
     if least < AGAINST && most < -0.5 * least { Err(Implausible::Against { correlation: least }) } else { Ok(()) }
+}
+
+/// Ratios of units that are taken for each other, and within which share a ratio is one of them.
+const UNITS: [(f64, &str); 3] =
+    [(1000.0, "millimetres beside metres"), (100.0, "centimetres beside metres"), (360.0 / TAU, "degrees beside radians")];
+const NEAR: f64 = 0.25;
+/// Columns go together from this correlation on.
+const TOGETHER: f64 = 0.7;
+
+/// A loop whose gain is that of a unit has two of them.
+fn unit(columns: &Columns, [_, most]: [f64; 2]) -> Result<(), Implausible> {
+    let spread = |values: &[f64]| {
+        let mean = mean(values);
+        values.iter().map(|value| (value - mean).powi(2)).sum::<f64>().sqrt()
+    };
+    let ratio = spread(&columns.measured) / spread(&columns.reference);
+    let near = |wanted: f64| (ratio / wanted - 1.0).abs() < NEAR;
+    let found = UNITS.iter().find(|(factor, _)| near(*factor) || near(1.0 / factor));
+    match found {
+        Some((_, units)) if most > TOGETHER => Err(Implausible::Unit { ratio, units }),
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]

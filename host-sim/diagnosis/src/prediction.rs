@@ -58,10 +58,12 @@ const TOLERANCE: f64 = 1.03;
 const WIDENING: f64 = 0.3;
 /// ...and by this much, in percentage points.
 const LEAST_WIDENING: f64 = 0.5;
+/// Forms of less weight do not lengthen the window.
+const LEAST_WEIGHT: f64 = 0.03;
 /// Share of draws beyond an end that alone is asked for.
 const ONE_SIDED: f64 = 0.05;
 /// Size in which what the model does not explain comes a second time, at worst.
-const AGAIN: f64 = std::f64::consts::SQRT_2;
+const AGAIN: f64 = 1.8;
 /// Most samples that are simulated in a draw.
 const LONGEST: usize = 4_000;
 /// Signals are flown at up to this factor of their speed, or as much slower.
@@ -72,7 +74,10 @@ const HELD: f64 = 0.3;
 /// The window that a model asks for: the smallest that is nearly as good as the best.
 pub fn window(record: &Record, identified: &Identified, features: Features, seed: u64) -> Option<Window> {
     let bench = Bench::new(record, identified);
-    let degree = identified.model.dead_time;
+    // Of the latest form that could be the true one: a shorter window would see nothing of what it asks for.
+    let latest =
+        identified.members.iter().filter(|member| member.weight > LEAST_WEIGHT).map(|member| member.model.dead_time).max();
+    let degree = latest.unwrap_or(0).max(identified.model.dead_time);
     let windows = PREVIEWS.iter().flat_map(|more| PASTS.iter().map(move |&past| Window { past, preview: degree + more }));
     let tried: Vec<(Window, f64)> = windows
         .collect::<Vec<_>>()

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::{
     identification::{Identified, Member},
-    record::Record,
+    record::{Record, Segment},
     transfer_function::TransferFunction,
 };
 
@@ -115,6 +115,10 @@ pub struct Properties {
     pub zeros: Vec<Zero>,
     /// Lag of slow signals, s.
     pub lag_s: Interval,
+    /// Frequency of the log's own motions, Hz: the reference's RMS speed over its RMS distance from its mean.
+    pub motion_hz: f64,
+    /// Lag of motions that fast, s: what one sees who lays one curve over the other.
+    pub motion_lag_s: Interval,
     /// Frequency of -3 dB, Hz; half the sub-rate if the loop is faster.
     pub bandwidth_hz: Interval,
     /// Time until a step has settled to 2 %, s.
@@ -154,6 +158,7 @@ impl Properties {
         let bandwidth_hz = over(&|model| model.bandwidth() / (std::f64::consts::TAU * period_s));
         let Interval { low, high, .. } = bandwidth_hz.wider(FORM, FORM_BANDWIDTH * bandwidth_hz.value);
         let half_hz = 0.5 / period_s;
+        let motion = motion(record);
         let reversals = |model: &TransferFunction| reversal(model, horizon).0;
         Self {
             strict_degree: strict(identified),
@@ -163,6 +168,8 @@ impl Properties {
             reversal: over(&reversals),
             reversal_ticks: reversal(model, horizon).1,
             zeros: zeros(model, draws, period_s),
+            motion_hz: motion / (std::f64::consts::TAU * period_s),
+            motion_lag_s: over(&|model| model.phase_delay(motion) * period_s).wider(FORM, FORM_TICKS * period_s),
             lag_s: over(&|model| model.lag() * period_s).wider(FORM, FORM_TICKS * period_s),
             bandwidth_hz: Interval { low: low.max(0.5 * bandwidth_hz.low), high: high.min(half_hz), ..bandwidth_hz },
             settling_s: model.settling() as f64 * period_s,
@@ -266,6 +273,17 @@ fn zeros(model: &TransferFunction, draws: &[TransferFunction], period_s: f64) ->
             }
         })
         .collect()
+}
+
+/// Frequency of the reference's motions, rad a sample.
+fn motion(record: &Record) -> f64 {
+    let (mut speeds, mut distances) = (0.0, 0.0);
+    for Segment { reference, .. } in &record.segments {
+        let mean = reference.iter().sum::<f64>() / reference.len().max(1) as f64;
+        speeds += reference.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum::<f64>();
+        distances += reference.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+    }
+    (speeds / distances).sqrt().clamp(1e-6, 1.0)
 }
 
 /// Natural frequency of a zero, Hz.

@@ -8,6 +8,8 @@ use crate::{
     verdict::{FAR, Gate, LEAST_REDUCTION, Verdict, is_beyond, judged_zeros},
 };
 
+/// Errors that differ by more than this factor are said to differ.
+const ALIKE: f64 = 1.5;
 /// Width of the text, characters.
 const WIDTH: usize = 130;
 
@@ -105,16 +107,15 @@ impl Diagnosis {
                 digits(prediction.window.past as f64 / self.sub_rate_hz)
             ),
         ));
+        lines.push(line("error without", self.errors_without(unit)));
         lines.push(line(
-            "predicted error",
+            "error with",
             format!(
-                "{:.3e} {unit} RMS without, {:.3e} ({:.3e} … {:.3e}) with the add-on; noise alone {:.3e}; on signals of the \
-                 log's kind",
-                prediction.baseline.value,
-                prediction.with_add_on.value,
-                prediction.with_add_on.low,
-                prediction.with_add_on.high,
-                prediction.floor
+                "{} ({} … {}) {unit} RMS predicted with the add-on; noise alone {}; on signals of the log's kind",
+                digits(prediction.with_add_on.value),
+                digits(prediction.with_add_on.low),
+                digits(prediction.with_add_on.high),
+                digits(prediction.floor)
             ),
         ));
         if let Some(other) = &self.with_difference_learning {
@@ -155,7 +156,13 @@ impl Diagnosis {
         lines.push(line("poles", format!("|z| {poles}")));
         lines.push(line(
             "lag of slow signals",
-            format!("{} s; settles in {} s", of_digits(properties.lag_s), digits(properties.settling_s)),
+            format!(
+                "{} s; of motions of {} Hz, as the log's are, {} s; settles in {} s",
+                of_digits(properties.lag_s),
+                digits(properties.motion_hz),
+                of_digits(properties.motion_lag_s),
+                digits(properties.settling_s)
+            ),
         ));
         lines.push(line("bandwidth (-3 dB)", self.bandwidth_text()));
         lines.push(line(
@@ -185,6 +192,21 @@ impl Diagnosis {
             ),
         ));
         lines
+    }
+
+    /// The error without the add-on, as logged and as predicted: two figures that should be near each other.
+    fn errors_without(&self, unit: &str) -> String {
+        let (logged, predicted) = (self.logged_error, self.prediction.baseline.value);
+        let ratio = predicted / logged;
+        let far = if (1.0 / ALIKE..=ALIKE).contains(&ratio) {
+            String::new()
+        } else {
+            format!(
+                ": {} times as much, since the model flies half of the log backwards at another speed; trust the share, not the size",
+                digits(ratio)
+            )
+        };
+        format!("{} {unit} RMS as logged; {} as the model predicts it{far}", digits(logged), digits(predicted))
     }
 
     /// A model that never falls by 3 dB has no bandwidth below half of its rate.

@@ -21,6 +21,8 @@ pub struct TransferFunction {
 /// Lowest frequency at which a bandwidth is looked for, as a share of half the rate, and steps from there.
 const SLOWEST: f64 = 1e-5;
 const BANDWIDTH_STEPS: u32 = 400;
+/// Steps in which a phase is followed.
+const PHASE_STEPS: u32 = 24;
 
 impl TransferFunction {
     /// Output for an input that had its first value for ever before.
@@ -86,9 +88,8 @@ impl TransferFunction {
         let bound = self.gain().abs() * std::f64::consts::FRAC_1_SQRT_2;
         let below = |angle: f64| self.response(angle).norm() < bound;
         // Even steps of the logarithm: a loop may be a thousand times slower than its log.
-        let steps = (0..=BANDWIDTH_STEPS).map(|step| {
-            std::f64::consts::PI * SLOWEST.powf(1.0 - f64::from(step) / f64::from(BANDWIDTH_STEPS))
-        });
+        let steps = (0..=BANDWIDTH_STEPS)
+            .map(|step| std::f64::consts::PI * SLOWEST.powf(1.0 - f64::from(step) / f64::from(BANDWIDTH_STEPS)));
         let mut before = 0.0;
         for angle in steps {
             if below(angle) {
@@ -102,6 +103,20 @@ impl TransferFunction {
             before = angle;
         }
         std::f64::consts::PI
+    }
+
+    /// By how many ticks a sine arrives later; `angle` in rad a tick. Not its group delay: what one sees who lays one curve over
+    /// the other.
+    pub fn phase_delay(&self, angle: f64) -> f64 {
+        let at = |angle: f64| at_angle(&self.numerator, angle) / at_angle(&self.denominator, angle);
+        // In steps, none of which is half a turn: the angle of a complex number does not tell whole turns.
+        let (mut phase, mut before) = (0.0, at(1e-6 * angle));
+        for step in 1..=PHASE_STEPS {
+            let now = at(angle * f64::from(step) / f64::from(PHASE_STEPS));
+            phase += (now / before).arg();
+            before = now;
+        }
+        self.dead_time as f64 - phase / angle
     }
 
     /// Lag at low frequency in ticks: how much later a slow signal arrives. (Group delay at ω = 0.)

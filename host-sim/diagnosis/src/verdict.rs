@@ -77,13 +77,6 @@ impl Gates {
             excitation: excitation(properties, coverage, 0.5 * sub_rate_hz),
         }
     }
-
-    /// What failed, if difference learning is wanted or not.
-    pub fn failures(&self, difference_learning: bool) -> Vec<&str> {
-        let gain = difference_learning.then_some(&self.unit_gain);
-        let failed = |gate: &&Gate| matches!(gate, Gate::Failed(_));
-        gain.into_iter().chain([&self.stable_inverse]).filter(failed).filter_map(Gate::why).collect()
-    }
 }
 
 impl Gate {
@@ -177,9 +170,8 @@ fn stable_inverse(
 ) -> Gate {
     let [shown, reach] = judged_hz(properties, coverage);
     let outside = |model: &TransferFunction, highest: f64, far: f64| {
-        let unstable = |zero: &Complex<f64>| {
-            (1.0..far).contains(&zero.norm()) && frequency_hz(*zero, 1.0 / sub_rate_hz) <= highest
-        };
+        let unstable =
+            |zero: &Complex<f64>| (1.0..far).contains(&zero.norm()) && frequency_hz(*zero, 1.0 / sub_rate_hz) <= highest;
         model.zeros().iter().any(unstable)
     };
     let share = |highest: f64, far: f64| {
@@ -195,11 +187,11 @@ fn stable_inverse(
             "zero outside of the unit circle{zeros}: the inverse is unstable, its reference grows without bound"
         ))
     } else if of_shown > 1.0 - SURE || of_all >= SURE || rivals.iter().any(|rival| outside(rival, shown, NEAR)) {
-        Gate::Undecided(format!(
-            "a zero may lie outside of the unit circle{zeros} ({:.0} % of the models that could be true have one there): a longer \
-             or quieter log decides",
-            100.0 * of_shown
-        ))
+        let who = match (100.0 * of_shown).round() {
+            0.0 => "a model that explains the log as well has one there".to_owned(),
+            percent => format!("{percent} % of the models that could be true have one there"),
+        };
+        Gate::Undecided(format!("a zero may lie outside of the unit circle{zeros} ({who}): a longer or quieter log decides"))
     } else if properties.explained < LEAST_EXPLAINED {
         Gate::Undecided(format!(
             "disturbances make up {:.0} % of what was measured and may hide a zero outside of the unit circle: a longer log, or one \

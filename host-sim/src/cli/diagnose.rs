@@ -38,13 +38,14 @@ A log is a CSV file with a header, one row a tick at a uniform rate, of the base
   time_s, reference (or desired), measured     any loop, in its own units; --columns names other columns
   time_s, desired_x_m, measured_x_m, … y, z    a flight log as `collect` writes it and `train` reads it; other columns are ignored
 Log steps of random height, or five tones and more, over the band that will be flown, for some hundred times the loop's response.
-measured is what the loop was told; if that is old, say how old with --delay-ms.
+measured is what the loop was told; if that is old, say how old with --delay-ms. Time on the ground before take-off and after
+landing is left out where it shows; cut it if it does not, and failures with it.
 
 Relative degree, gain, zeros and bandwidth are those of the reference to the measured value at the sub-rate. Intervals hold 95 \
 % of the
 linear models that could be the true one; at the lower end of the predicted reduction, what the log leaves unexplained is the \
 loop's doing and
-comes again, 1.4 times as large. The prediction is about a linear window over the desired output, trained on such a log and \
+comes again, 1.8 times as large. The prediction is about a linear window over the desired output, trained on such a log and \
 flown along signals
 of the log's kind: measured errors, so with the noise in them.
 

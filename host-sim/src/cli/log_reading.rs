@@ -17,6 +17,15 @@ pub(super) struct LogReading {
     /// The measured value counts against the reference, as in another frame.
     #[arg(long)]
     negate_measured: bool,
+    /// What the measured value is multiplied by to have the reference's unit, as 0.001 for millimetres beside metres.
+    #[arg(long, value_name = "FACTOR", value_parser = factor)]
+    measured_scale: Option<f64>,
+}
+
+fn factor(text: &str) -> Result<f64, String> {
+    let factor: f64 = text.parse().map_err(|_| "expected a number".to_owned())?;
+    let sane = (1e-9..=1e9).contains(&factor);
+    sane.then_some(factor).ok_or_else(|| "expected a factor from 1e-9 to 1e9; for another sign see --negate-measured".into())
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -35,7 +44,7 @@ impl LogReading {
             Unit::Us => TimeUnit::Microseconds,
             Unit::Ns => TimeUnit::Nanoseconds,
         });
-        Reading { time_unit, negated: self.negate_measured }
+        Reading { time_unit, negated: self.negate_measured, scale: self.measured_scale }
     }
 }
 

@@ -218,3 +218,37 @@ fn logs_of_all_kinds_are_read_for_what_they_are() {
     let (found, said) = lag("merged.csv");
     assert!((found - wanted).abs() < 0.005 && said.contains("reference was held in 2500 row(s)"), "{found} {wanted} {said}");
 }
+
+#[test]
+fn time_on_the_ground_is_left_out_and_another_unit_asked_about() {
+    let folder = Folder::new();
+    let flight = log(1.0, 2000);
+    folder.write("cut.csv", &flight);
+    let rows: Vec<Vec<f64>> =
+        flight.lines().skip(1).map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect();
+    let with_ground = (0..2600).fold(String::from("time_s,reference,measured\n"), |text, row: usize| {
+        let time = row as f64 * 0.02;
+        match row.checked_sub(300).and_then(|row| rows.get(row)) {
+            Some(row) => text + &format!("{time},{},{}\n", 3.0 + row[1], 3.0 + row[2]),
+            None if row < 300 => text + &format!("{time},0,0.01\n"),
+            None => text + &format!("{time},0,2.9\n"),
+        }
+    });
+    folder.write("whole.csv", with_ground);
+    let of = |name: &str| folder.fine(&format!("diagnose --log {name} --sub-rate 50"));
+    let (cut, whole) = (of("cut.csv"), of("whole.csv"));
+    for part in ["300 rows up to line 301", "300 rows from line 2302 on"] {
+        assert!(whole.stderr.contains(part), "{}", whole.stderr);
+    }
+    let verdict = |text: &str| text.lines().find(|line| line.starts_with("verdict")).map(|line| line[..60].to_owned());
+    assert_eq!(verdict(&cut.stdout), verdict(&whole.stdout));
+    let millimetres = rows.iter().fold(String::from("time_s,reference,measured\n"), |text, row| {
+        text + &format!("{},{},{}\n", row[0], row[1], 1000.0 * row[2])
+    });
+    folder.write("mm.csv", millimetres);
+    let refusal = folder.run("diagnose --log mm.csv");
+    assert!(refusal.code == 2 && refusal.stderr.contains("--measured-scale"), "{}", refusal.stderr);
+    assert_eq!(folder.fine("diagnose --log mm.csv --sub-rate 50 --measured-scale 0.001").stdout, cut.stdout);
+    let refusal = folder.run("diagnose --log mm.csv --measured-scale 0");
+    assert!(refusal.code == 2 && refusal.stderr.contains("1e-9"), "{}", refusal.stderr);
+}

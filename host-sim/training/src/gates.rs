@@ -1,9 +1,10 @@
-//! The gates of a diagnosis before a training, axis by axis.
+//! The diagnosis before a training, axis by axis.
 //!
-//! *in* flight logs; *out* what each axis shows; *never* a failure of an axis on which nothing was asked; *source* Zhou 2017,
-//! Insight 1b, Lemma 1: stable inverse, gain of one for difference learning.
+//! *in* flight logs; *out* what each axis shows; *never* a failure of an axis on which nothing was asked, nor another verdict than
+//! that of `diagnose`; *source* Zhou 2017, Lemma 1: gain of one for difference learning. That the inverse is stable (Insight 1b)
+//! is not needed: what is trained is a window over the desired output, which stays bounded.
 
-use impromptu_diagnosis::{DiagnosisError, Gate, Gates, Settings, assess};
+use impromptu_diagnosis::{Diagnosis, DiagnosisError, Gate, Gates, Settings, Verdict, diagnose};
 use impromptu_sim::flight_log::FlightLog;
 use serde::Serialize;
 
@@ -14,9 +15,9 @@ use crate::{breakdown::sound, channel::of_logs};
 pub struct AxisGates {
     /// Name of the axis.
     pub axis: &'static str,
-    /// Outcomes; `None` if the axis is not asked to move, or if there is too little to judge by.
-    pub gates: Option<Gates>,
-    /// Why there are no outcomes, if the axis is asked to move.
+    /// Diagnosis; `None` if the axis is not asked to move, or if there is too little to judge by.
+    pub diagnosis: Option<Box<Diagnosis>>,
+    /// Why there is none, if the axis is asked to move.
     pub trouble: Option<Trouble>,
 }
 
@@ -41,14 +42,14 @@ pub fn check_gates(logs: &[FlightLog], measurement_delay_s: f64, seed: u64) -> V
     let settings = Settings { draws: DRAWS, seed, ..Settings::default() };
     let axis = |(index, axis)| {
         if extent(&logs, index) < LEAST_EXTENT {
-            return AxisGates { axis, gates: None, trouble: None };
+            return AxisGates { axis, diagnosis: None, trouble: None };
         }
         let found = of_logs(logs.iter().copied(), index, measurement_delay_s).map_err(DiagnosisError::from);
-        match found.and_then(|record| assess(&record, &settings)) {
-            Ok(assessment) => AxisGates { axis, gates: Some(assessment.gates), trouble: None },
+        match found.and_then(|record| diagnose(&record, &settings)) {
+            Ok(diagnosis) => AxisGates { axis, diagnosis: Some(Box::new(diagnosis)), trouble: None },
             Err(error) => {
                 let fatal = !matches!(error, DiagnosisError::Short { .. } | DiagnosisError::Record(_));
-                AxisGates { axis, gates: None, trouble: Some(Trouble { why: error.to_string(), fatal }) }
+                AxisGates { axis, diagnosis: None, trouble: Some(Trouble { why: error.to_string(), fatal }) }
             }
         }
     };
@@ -62,19 +63,34 @@ fn extent(logs: &[&FlightLog], axis: usize) -> f64 {
 }
 
 impl AxisGates {
-    /// What failed, for features relative to now.
+    /// Why features relative to now would do harm, or nothing.
     pub fn failures(&self) -> Vec<String> {
-        let gates = self.gates.iter().flat_map(|gates| gates.failures(true)).map(str::to_owned);
+        let diagnosis = self.diagnosis.iter().flat_map(|found| {
+            let gain = match &found.gates.unit_gain {
+                Gate::Failed(why) => Some(why.clone()),
+                Gate::Passed | Gate::Undecided(_) => None,
+            };
+            gain.into_iter().chain((found.verdict == Verdict::WillNot).then(|| found.verdict_text()))
+        });
         let trouble = self.trouble.iter().filter(|trouble| trouble.fatal).map(|trouble| trouble.why.clone());
-        gates.chain(trouble).map(|why| self.named(&why)).collect()
+        diagnosis.chain(trouble).map(|why| self.named(&why)).collect()
     }
 
     /// What could not be decided.
     pub fn warnings(&self) -> Vec<String> {
-        let gates = self.gates.iter().flat_map(|gates| [&gates.unit_gain, &gates.stable_inverse, &gates.excitation]);
-        let undecided = gates.filter(|gate| matches!(gate, Gate::Undecided(_))).filter_map(Gate::why).map(str::to_owned);
+        let diagnosis = self.diagnosis.iter().flat_map(|found| {
+            let Gates { unit_gain, stable_inverse, excitation } = &found.gates;
+            let gates = [unit_gain, stable_inverse, excitation].into_iter().filter_map(|gate| match gate {
+                Gate::Undecided(why) => Some(why.clone()),
+                Gate::Failed(why) if gate == stable_inverse => {
+                    Some(format!("{why}; a window over the desired output stays bounded"))
+                }
+                Gate::Passed | Gate::Failed(_) => None,
+            });
+            gates.chain((found.verdict == Verdict::CannotTell).then(|| found.verdict_text())).collect::<Vec<_>>()
+        });
         let trouble = self.trouble.iter().filter(|trouble| !trouble.fatal).map(|trouble| trouble.why.clone());
-        undecided.chain(trouble).map(|why| self.named(&why)).collect()
+        diagnosis.chain(trouble).map(|why| self.named(&why)).collect()
     }
 
     fn named(&self, why: &str) -> String {

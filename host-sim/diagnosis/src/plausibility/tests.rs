@@ -132,3 +132,91 @@ proptest! {
         }
     }
 }
+
+/// A flight with time on the ground before and after it: the set-points are 0 there, the vehicle stands where it stands.
+fn with_ground(before: usize, after: usize) -> Columns {
+    let mut all = columns(1500);
+    all.reference.iter_mut().chain(&mut all.measured).for_each(|value| *value += 4.0);
+    let [first, last] = [0.01, *all.measured.last().unwrap()];
+    let padded = |values: &[f64], before_at: f64, after_at: f64| -> Vec<f64> {
+        let ends = |at: f64, count: usize| std::iter::repeat_n(at, count);
+        ends(before_at, before).chain(values.iter().copied()).chain(ends(after_at, after)).collect()
+    };
+    let rows = before + all.time.len() + after;
+    Columns {
+        lines: (2..rows as u64 + 2).collect(),
+        time: (0..rows).map(|row| row as f64 * 0.02).collect(),
+        reference: padded(&all.reference, 0.0, 0.0),
+        measured: padded(&all.measured, first, last),
+        rate: None,
+        decimal: true,
+    }
+}
+
+#[test]
+fn time_on_the_ground_is_left_out_with_its_lines() {
+    let (found, notes) = read(with_ground(300, 250)).unwrap();
+    assert_eq!((found.measured.len(), found.lines[0], *found.lines.last().unwrap()), (1500, 302, 1801));
+    assert!(notes[0].contains("300 rows up to line 301") && notes[1].contains("250 rows from line 1802 on"), "{notes:?}");
+    // A loop at rest where it was told to be is no ground, whatever its gain.
+    for gain in [1.0, 0.4] {
+        let mut rest = columns(1500);
+        let [u, y] = [rest.reference[1200], gain * rest.reference[1200]];
+        rest.measured.iter_mut().for_each(|value| *value *= gain);
+        rest.reference[1200..].fill(u);
+        rest.measured[1220..].fill(y);
+        let (found, notes) = read(rest).unwrap();
+        assert!(found.measured.len() == 1500 && notes.is_empty(), "{gain}: {notes:?}");
+    }
+}
+
+#[test]
+fn another_unit_is_asked_about_unless_it_is_stated() {
+    for (factor, named) in [(1000.0, "millimetres"), (0.001, "millimetres"), (57.2958, "degrees"), (0.01, "centimetres")] {
+        let mut other = columns(600);
+        other.measured.iter_mut().for_each(|value| *value *= factor);
+        let refusal = read(other.clone()).expect_err("another unit");
+        let said = refusal.to_string();
+        assert!(refusal.leaves_open() && said.contains(named) && said.contains("--measured-scale"), "{said}");
+        let stated = Reading { scale: Some(1.0 / factor), ..Reading::default() };
+        let (found, _) = plausible(other.clone(), "t", &stated).unwrap();
+        assert!(found.measured.iter().zip(columns(600).measured).all(|(a, b)| (a - b).abs() < 1e-9));
+        let meant = Reading { scale: Some(1.0), ..Reading::default() };
+        assert_eq!(plausible(other.clone(), "t", &meant).unwrap().0.measured, other.measured);
+    }
+}
+
+proptest! {
+    /// Jitter of a third of a row and a fifth of the rows lost: one rate, and the values of that time.
+    #[test]
+    fn uneven_rows_are_brought_to_one_rate(seed in 1u64..1000, lost in 0u64..20, late in 0.0f64..0.35) {
+        let mut state = seed;
+        let mut draw = |below: u64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) % below
+        };
+        let tones = |t: f64| (1.3 * t).sin() + 0.5 * (4.1 * t).sin();
+        let mut time = vec![0.0];
+        time.extend((1..1500).filter_map(|row| {
+            let jitter = late * (draw(1000) as f64 / 500.0 - 1.0);
+            (draw(100) >= lost).then_some((f64::from(row) + jitter) * 0.02)
+        }));
+        let columns = Columns {
+            lines: (2..time.len() as u64 + 2).collect(),
+            reference: time.iter().map(|t| tones(*t)).collect(),
+            measured: time.iter().map(|t| tones(*t - 0.3)).collect(),
+            time,
+            rate: None,
+            decimal: true,
+        };
+        let (found, notes) = read(columns).unwrap();
+        let steps: Vec<f64> = found.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        if !notes.is_empty() {
+            prop_assert!(notes[0].contains("brought to"), "{notes:?}");
+            prop_assert!(steps.iter().all(|step| (step / 0.02 - 1.0).abs() < 0.12), "{:?}", steps[0]);
+            for (time, value) in found.time.iter().zip(&found.measured) {
+                prop_assert!((value - tones(time - 0.3)).abs() < 0.1, "{time} {value}");
+            }
+        }
+    }
+}

@@ -239,5 +239,9 @@ fn discretised(numerator: &[f64], denominator: &[f64], gain: f64, period_s: f64)
     system[(order - 1, order)] = 1.0;
     let exponential = (system * (period_s * scale)).exp();
     let output = DVector::from_fn(order, |power, _| gain * of(numerator, power) / leading);
-    (exponential.view((0, 0), (order, order)).clone_owned(), exponential.view((0, order), (order, 1)).column(0).clone_owned(), output)
+    (
+        exponential.view((0, 0), (order, order)).clone_owned(),
+        exponential.view((0, order), (order, 1)).column(0).clone_owned(),
+        output,
+    )
 }

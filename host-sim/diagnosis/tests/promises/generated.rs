@@ -137,7 +137,6 @@ fn long_a_thousand_more_loops_are_judged_rightly_and_930_predictions_hold() {
     let verdicts = count(&Outcome::sound);
     let (degrees, covered) = (count(&Outcome::degrees_right), count(&Outcome::covered));
     println!("of {}: {verdicts} verdicts, {degrees} relative degrees, {covered} predictions", outcomes.len());
-    let failed: Vec<Outcome> =
-        outcomes.into_iter().filter(|outcome| !outcome.sound() || !outcome.degrees_right()).collect();
+    let failed: Vec<Outcome> = outcomes.into_iter().filter(|outcome| !outcome.sound() || !outcome.degrees_right()).collect();
     assert!(verdicts >= 990 && degrees >= 990 && covered >= 930, "{}", lines(&failed));
 }

@@ -141,7 +141,7 @@ fn what_cannot_be_diagnosed_is_refused_with_what_to_do() {
 fn every_gate_says_what_it_saw() {
     let found = diagnosis(&step_test(&paper([450.0, -450.9]), 3000, 0.05));
     assert!(matches!(&found.gates.stable_inverse, Gate::Failed(why) if why.contains("1.002")), "{:?}", found.gates);
-    assert_eq!((found.gates.failures(true).len(), found.gates.failures(false).len()), (2, 1));
+    assert!(matches!(found.gates.unit_gain, Gate::Failed(_)), "{:?}", found.gates);
     let text: String = found.lines("m").iter().map(|[label, text]| format!("{label}: {text}\n")).collect();
     for part in ["verdict: will help by a window", "initial reversal", "zeros: 1.002", "above 10 % of the step", "seed 1"] {
         assert!(text.contains(part), "`{part}` is missing in\n{text}");

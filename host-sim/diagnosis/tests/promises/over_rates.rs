@@ -1,12 +1,8 @@
 //! The promise of the diagnosis on loops of any speed, logged at any rate for any time beside any disturbance.
 
 use impromptu_diagnosis::{
-    Diagnosis, DiagnosisError, Gate, Record, Settings, Verdict,
-    add_on::AddOn,
-    diagnose,
-    prediction::root_mean_square,
-    properties::Interval,
-    verdict::LEAST_REDUCTION,
+    Diagnosis, DiagnosisError, Gate, Record, Settings, Verdict, add_on::AddOn, diagnose, prediction::root_mean_square,
+    properties::Interval, verdict::LEAST_REDUCTION,
 };
 use rayon::prelude::*;
 
@@ -92,7 +88,8 @@ impl Outcome {
         let tail = match found {
             Err(error) => error.to_string(),
             Ok(found) => {
-                let of = |name: &str, Interval { low, value, high }: Interval| format!("{name} {value:.3} ({low:.3} … {high:.3})");
+                let of =
+                    |name: &str, Interval { low, value, high }: Interval| format!("{name} {value:.3} ({low:.3} … {high:.3})");
                 let properties = &found.properties;
                 [
                     format!("{} at {:.1} Hz", found.verdict.words(), found.sub_rate_hz),
@@ -121,7 +118,8 @@ fn flown(logged: &Logged, record: &Record, found: &Diagnosis, seed: u64) -> f64 
         let time: Vec<f64> = (0..rows).map(|row| row as f64 / logged.rate_hz).collect();
         let slow_desired = Record::new(&time, &desired, &desired).unwrap().slower(divisor).segments.remove(0).reference;
         let references = add_on.references(&slow_desired);
-        let corrections: Vec<f64> = references.iter().zip(&slow_desired).map(|(reference, desired)| reference - desired).collect();
+        let corrections: Vec<f64> =
+            references.iter().zip(&slow_desired).map(|(reference, desired)| reference - desired).collect();
         let last = corrections.len() - 1;
         let corrected: Vec<f64> = (0..rows)
             .map(|row| {
