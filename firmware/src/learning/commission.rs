@@ -357,8 +357,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
 
-        /// At any rate and speed a loop is found beside noise of up to half of what it answers, well within the factor of two that
-        /// a learner bears, with no more than the stated steps.
+        /// At any rate and speed a loop is found beside noise of up to half of what it answers, well within the factor of two
+        /// that a learner bears, with no more than the stated steps.
         #[test]
         fn it_finds_what_answered(
             gain in 0.5f32..2.0, rounds in 1.2f32..6.0, damping in 0.3f32..1.5, late in 0f32..0.6, rate in 80f32..1000.0,

@@ -55,7 +55,7 @@ const HIGHEST_ORDER: usize = 4;
 /// A draw that leaves more than this times what the model leaves of the log, in mean square, could not be the true one: where
 /// poles nearly cancel zeros, a normal distribution of coefficients reaches far out of the data's valley.
 const WORSE: f64 = 1.5;
-/// A form is a rival if its likelihood is within this of the best one's, twice in logarithms: chi-squared, two coefficients, 95 %.
+/// A form is a rival if its likelihood is within this of the best one's, twice in logarithms: chi-squared for two at 95 %.
 const RIVAL: f64 = 6.0;
 /// Coefficients that a rival may have more than the best model: others find zeros beside poles in any noise.
 const RIVAL_SIZE: f64 = 2.0;
@@ -153,8 +153,8 @@ pub fn identify(record: &Record) -> Option<Identified> {
     })
 }
 
-/// The forms that the log does not rule out, and the rivals. Errors that are not white make every difference of likelihoods larger than it is, by
-/// as much as they make the covariance larger.
+/// The forms that the log does not rule out, and the rivals. Errors that are not white make every difference of likelihoods
+/// larger than it is, by as much as they make the covariance larger.
 fn members(whitened: &Whitened, candidates: &[Candidate], chosen: usize) -> (Vec<Member>, Vec<TransferFunction>) {
     let of_chosen = &candidates[chosen];
     let robust = whitened.robust(of_chosen);

@@ -10,7 +10,7 @@
 //! | whole numbers as time, a unit or more apart | refused, unless the column is ULog's `timestamp` or the unit is stated |
 //! | the measured value jumps by 360° or 2 pi within a row and hardly moves else | both columns unwrapped |
 //! | up to three samples in a row, far out of what the rest spans | a line between their neighbours |
-//! | at an end the reference rests, and the measured value rests elsewhere or leaps from there | left out, as time on the ground |
+//! | at an end the reference rests, and the measured value rests elsewhere or leaps away | left out, as time on the ground |
 //! | steps of time differ, or rows are lost | brought to one rate by straight lines |
 //! | the measured value is the reference | refused |
 //! | the measured value is 1000, 100, 57.3 times as large as the reference, or as small | refused, unless its unit is stated |

@@ -90,7 +90,10 @@ impl Diagnosis {
         let line = |label: &str, text: String| [label.to_owned(), text];
         let mut lines = vec![line("verdict", self.verdict_text())];
         for gate in [&self.gates.unit_gain, &self.gates.stable_inverse, &self.gates.excitation] {
-            if let Gate::Undecided(why) = gate {
+            // What the verdict says already is not said again.
+            if let Gate::Undecided(why) = gate
+                && !lines[0][1].contains(why.as_str())
+            {
                 lines.push(line("undecided", why.clone()));
             }
         }
