@@ -107,8 +107,8 @@ pub enum Implausible {
     },
     /// Another unit.
     #[error(
-        "the measured value is {ratio:.4} times as large as the reference and goes with it: {units}? Say with --measured-scale what \
-         makes it the reference's unit (1 if it is)"
+        "the measured value is {ratio:.4} times as large as the reference and goes with it: {units}? Say with --measured-scale \
+         what makes it the reference's unit (1 if it is)"
     )]
     Unit {
         /// How many times.

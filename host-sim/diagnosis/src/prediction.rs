@@ -32,8 +32,8 @@ pub struct Prediction {
     pub with_add_on: Interval,
     /// Reduction of the error, %; negative: worse.
     pub reduction_percent: Interval,
-    /// The same where what the model does not explain comes once, as it does if it is a disturbance from outside; 95 % of the draws
-    /// are above its lower end, and as many below its upper one: what the verdict is about.
+    /// The same where what the model does not explain comes once, as it does if it is a disturbance from outside; 95 % of the
+    /// draws are above its lower end, and as many below its upper one: what the verdict is about.
     pub undisturbed_percent: Interval,
     /// RMS that the noise alone leaves, in the output's unit.
     pub floor: f64,

@@ -47,8 +47,8 @@ impl Diagnosis {
         text
     }
 
-    /// What to log next, where this one does not decide: longer by the square of what its interval is too wide by, or larger by as
-    /// much, since the noise stays as it is.
+    /// What to log next, where this one does not decide: longer by the square of what its interval is too wide by, or larger by
+    /// as much, since the noise stays as it is.
     fn next(&self) -> String {
         let Interval { low, value, high } = self.prediction.undisturbed_percent;
         let wide = if value >= LEAST_REDUCTION { value - low } else { high - value };
@@ -205,7 +205,8 @@ impl Diagnosis {
             String::new()
         } else {
             format!(
-                ": {} times as much, since the model flies half of the log backwards at another speed; trust the share, not the size",
+                ": {} times as much, since the model flies half of the log backwards at another speed; trust the share, not \
+                 the size",
                 digits(ratio)
             )
         };

@@ -194,8 +194,8 @@ fn stable_inverse(
         Gate::Undecided(format!("a zero may lie outside of the unit circle{zeros} ({who}): a longer or quieter log decides"))
     } else if properties.explained < LEAST_EXPLAINED {
         Gate::Undecided(format!(
-            "disturbances make up {:.0} % of what was measured and may hide a zero outside of the unit circle: a longer log, or one \
-             of larger amplitude, decides",
+            "disturbances make up {:.0} % of what was measured and may hide a zero outside of the unit circle: a longer log, or \
+             one of larger amplitude, decides",
             100.0 * (1.0 - properties.explained)
         ))
     } else {
@@ -221,8 +221,8 @@ fn excitation(properties: &Properties, coverage: &Coverage, half_rate_hz: f64) -
         ))
     } else {
         Gate::Undecided(format!(
-            "the reference shows only {percent:.0} % of the loop's band (0 … {} Hz) above the noise, and nothing above {} Hz: for \
-             faster motions, log steps, or many tones up to there",
+            "the reference shows only {percent:.0} % of the loop's band (0 … {} Hz) above the noise, and nothing above {} Hz: \
+             for faster motions, log steps, or many tones up to there",
             digits(bandwidth_hz),
             digits(coverage.highest_hz)
         ))

@@ -1,8 +1,8 @@
 //! The diagnosis before a training, axis by axis.
 //!
-//! *in* flight logs; *out* what each axis shows; *never* a failure of an axis on which nothing was asked, nor another verdict than
-//! that of `diagnose`; *source* Zhou 2017, Lemma 1: gain of one for difference learning. That the inverse is stable (Insight 1b)
-//! is not needed: what is trained is a window over the desired output, which stays bounded.
+//! *in* flight logs; *out* what each axis shows; *never* a failure of an axis on which nothing was asked, nor another verdict
+//! than that of `diagnose`; *source* Zhou 2017, Lemma 1: gain of one for difference learning. That the inverse is stable (Insight
+//! 1b) is not needed: what is trained is a window over the desired output, which stays bounded.
 
 use impromptu_diagnosis::{Diagnosis, DiagnosisError, Gate, Gates, Settings, Verdict, diagnose};
 use impromptu_sim::flight_log::FlightLog;

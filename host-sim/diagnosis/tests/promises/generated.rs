@@ -49,7 +49,8 @@ impl Outcome {
         }
     }
 
-    /// Whether the verdict is not wrong: that a window will help is so also where the log leaves open whether the inverse is stable.
+    /// Whether the verdict is not wrong: that a window will help is so also where the log leaves open whether the
+    /// inverse is stable.
     fn sound(&self) -> bool {
         let open = matches!(self.found.gates.stable_inverse, Gate::Undecided(_));
         self.exact() || self.found.verdict == Verdict::WillHelpByWindow && open

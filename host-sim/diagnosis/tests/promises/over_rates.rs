@@ -71,8 +71,8 @@ impl Outcome {
     fn line(&self) -> String {
         let Self { logged, found, measured } = self;
         let head = format!(
-            "{} gain {:.2}, pole {:.2} Hz, zero {:.2} Hz, lag {:.3} s, bandwidth {:.2} Hz, log {:.0} Hz x {:.0} s ({:.0} settling \
-             times), disturbance {:.2} of {:.2} s",
+            "{} gain {:.2}, pole {:.2} Hz, zero {:.2} Hz, lag {:.3} s, bandwidth {:.2} Hz, log {:.0} Hz x {:.0} s ({:.0} \
+             settling times), disturbance {:.2} of {:.2} s",
             if logged.minimum_phase { "minimum phase" } else { "NON-minimum phase" },
             logged.gain,
             logged.pole_hz,
@@ -155,7 +155,8 @@ fn outcomes(seed: u64, count: usize) -> (Vec<Outcome>, String) {
     let untold = long.iter().filter(|outcome| !outcome.told()).count();
     let wrong = outcomes.iter().filter(|outcome| outcome.wrong().is_some()).count();
     text += &format!(
-        "seed {seed}, {count} loops: {wrong} wrong verdicts; {untold} of {} long logs cannot tell; inside of the 95 % intervals: {}\n",
+        "seed {seed}, {count} loops: {wrong} wrong verdicts; {untold} of {} long logs cannot tell; inside of the 95 % \
+         intervals: {}\n",
         long.len(),
         shares.join(", ")
     );
