@@ -6,7 +6,10 @@
 use nalgebra::{Complex, DMatrix};
 use serde::Serialize;
 
-use crate::record::{Record, Segment};
+use crate::{
+    columns::mean,
+    record::{Record, Segment},
+};
 
 /// What of the loop's band the record shows.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -200,10 +203,6 @@ pub fn lowest(record: &Record) -> f64 {
         seen += record.segments.iter().map(|segment| power(&segment.reference, line as f64 / longest as f64)).sum::<f64>();
     }
     line as f64 / (longest.max(1) as f64 * record.period_s)
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 /// Variance of a stretch that one line, in cycles a sample, holds, times the samples.

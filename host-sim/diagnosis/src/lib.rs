@@ -16,20 +16,23 @@
 //! | layer | modules | what they hold |
 //! |---|---|---|
 //! | 1 | `polynomial`, `record`, `cholesky` | roots and filters; signals in step; positive definite systems |
-//! | 1 | `plausibility`, `digits` | whether columns can be what they are taken for; numbers for people |
+//! | 1 | `columns`, `digits` | a log as it is read; numbers for people |
 //! | 2 | `transfer_function`, `least_squares` | a rational function of z; the regression with its covariance |
+//! | 2 | `stretches` | time on the ground, uneven rows |
+//! | 3 | `plausibility` | whether columns can be what they are taken for |
 //! | 3 | `arx`, `excitation`, `add_on` | lagged regressors; what the log can tell at all; the add-on that is assumed |
 //! | 4 | `output_error` | a model of one form, its likelihood and covariance |
-//! | 4 | `identification` | order, dead time, the forms that the log does not rule out |
-//! | 5 | `properties` | gain, zeros, relative degree, lag, each with its interval |
-//! | 6 | `prediction` | by how much the error will shrink |
-//! | 7 | `verdict` | gates and what they come to |
-//! | 8 | `diagnosis` | all of it, at the sub-rate that suits the loop best |
-//! | 9 | `report` | the diagnosis in words |
+//! | 5 | `identification` | order, dead time, the forms that the log does not rule out |
+//! | 6 | `properties` | gain, zeros, relative degree, lag, each with its interval |
+//! | 7 | `prediction` | by how much the error will shrink |
+//! | 8 | `verdict` | gates and what they come to |
+//! | 9 | `diagnosis` | all of it, at the sub-rate that suits the loop best |
+//! | 10 | `report` | the diagnosis in words |
 
 pub mod add_on;
 pub mod arx;
 pub mod cholesky;
+pub mod columns;
 pub mod diagnosis;
 pub mod digits;
 pub mod excitation;
@@ -42,6 +45,7 @@ pub mod prediction;
 pub mod properties;
 pub mod record;
 pub mod report;
+mod stretches;
 pub mod transfer_function;
 pub mod verdict;
 

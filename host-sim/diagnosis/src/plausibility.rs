@@ -16,11 +16,13 @@
 //! | the measured value is 1000, 100, 57.3 times as large as the reference, or as small | refused, unless its unit is stated |
 //! | the measured value goes against the reference | refused, unless it is stated to count the other way |
 
-mod stretches;
-
 use std::f64::consts::TAU;
 
-use stretches::{airborne, evened};
+pub use crate::columns::Columns;
+use crate::{
+    columns::{mean, median},
+    stretches::{airborne, evened},
+};
 
 /// Unit of a column of time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,23 +58,6 @@ pub struct Reading {
     pub negated: bool,
     /// What the measured value is multiplied by to have the reference's unit.
     pub scale: Option<f64>,
-}
-
-/// Columns of a log.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Columns {
-    /// Line of each row in the file, from 1.
-    pub lines: Vec<u64>,
-    /// Time, in the unit of the log, then s.
-    pub time: Vec<f64>,
-    /// Reference.
-    pub reference: Vec<f64>,
-    /// Measured value.
-    pub measured: Vec<f64>,
-    /// Its rate of change, if the log has it.
-    pub rate: Option<Vec<f64>>,
-    /// Whether a time is written with a decimal point or an exponent, as seconds are.
-    pub decimal: bool,
 }
 
 /// Why columns cannot be what they are taken for.
@@ -191,11 +176,6 @@ fn without_repetitions(columns: Columns, notes: &mut Vec<String>) -> Result<Colu
         rate: rate.as_deref().map(pick),
         decimal: *decimal,
     })
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// Times in seconds. Loggers write whole numbers of milli-, micro- or nanoseconds; a loop of a row a second and slower is rare,
@@ -331,10 +311,6 @@ fn alike(columns: &Columns) -> [f64; 2] {
     // As far as a twentieth of the log.
     let found = (0..LAGS).map(|lag| correlation(lag * rows / (20 * LAGS)));
     found.fold([0.0, 0.0], |[least, most], value| [value.min(least), value.max(most)])
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 /// A loop that follows its reference, however late, is not for long on its other side.

@@ -235,6 +235,9 @@ impl Train {
     fn pass_gates(&self, invocation: &Invocation, logs: &[FlightLog], delay_s: f64, seed: u64) -> Result<Passed> {
         let axes = check_gates(logs, delay_s, seed);
         let failures: Vec<String> = axes.iter().flat_map(AxisGates::failures).collect();
+        for prediction in axes.iter().filter_map(AxisGates::prediction) {
+            invocation.console.note(&prediction);
+        }
         for warning in axes.iter().flat_map(AxisGates::warnings) {
             invocation.console.note(&format!("warning: {warning}"));
         }

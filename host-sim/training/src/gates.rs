@@ -4,7 +4,7 @@
 //! than that of `diagnose`; *source* Zhou 2017, Lemma 1: gain of one for difference learning. That the inverse is stable (Insight
 //! 1b) is not needed: what is trained is a window over the desired output, which stays bounded.
 
-use impromptu_diagnosis::{Diagnosis, DiagnosisError, Gate, Gates, Settings, Verdict, diagnose};
+use impromptu_diagnosis::{Diagnosis, DiagnosisError, Gate, Gates, Settings, Verdict, diagnose, properties::Interval};
 use impromptu_sim::flight_log::FlightLog;
 use serde::Serialize;
 
@@ -91,6 +91,16 @@ impl AxisGates {
         });
         let trouble = self.trouble.iter().filter(|trouble| !trouble.fatal).map(|trouble| trouble.why.clone());
         diagnosis.chain(trouble).map(|why| self.named(&why)).collect()
+    }
+
+    /// What is predicted of an axis on which something will help.
+    pub fn prediction(&self) -> Option<String> {
+        let found = self.diagnosis.as_ref().filter(|found| !matches!(found.verdict, Verdict::WillNot | Verdict::CannotTell))?;
+        let Interval { low, value, high } = found.prediction.reduction_percent;
+        let words = found.verdict.words();
+        Some(self.named(&format!(
+            "{words}; a linear window would reduce the measured RMS error by {value:.0} % ({low:.0} … {high:.0} %)"
+        )))
     }
 
     fn named(&self, why: &str) -> String {

@@ -1,6 +1,9 @@
 //! Stretches that are not the loop's, and rows that do not come evenly.
+//!
+//! *in* columns; *out* the same without time on the ground, at one rate, and what was done in words; *never* a stretch cut that a
+//! loop at rest may have made; *source* ours.
 
-use super::Columns;
+use crate::columns::{Columns, median};
 
 /// Fewest rows of a stretch at an end of a log, and its least share of the log.
 const FEWEST: usize = 20;
@@ -14,7 +17,7 @@ const LEAP: f64 = 0.3;
 
 /// Cuts the time on the ground off: at an end of the log the reference rests, the measured value as well, and either they have
 /// nothing to do with each other, or the log then goes on from elsewhere.
-pub(super) fn airborne(columns: Columns, notes: &mut Vec<String>) -> Columns {
+pub(crate) fn airborne(columns: Columns, notes: &mut Vec<String>) -> Columns {
     let Columns { lines, reference, measured, .. } = &columns;
     let rows = measured.len();
     let fewest = FEWEST.max((SHORTEST * rows as f64) as usize);
@@ -72,9 +75,9 @@ const MOST_UNEVEN: f64 = 0.03;
 const GAP: f64 = 8.5;
 
 /// Brings rows that come unevenly, or of which many are lost, to one rate by straight lines between them.
-pub(super) fn evened(mut columns: Columns, notes: &mut Vec<String>) -> Columns {
+pub(crate) fn evened(mut columns: Columns, notes: &mut Vec<String>) -> Columns {
     let steps: Vec<f64> = columns.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let usual = super::median(steps.clone());
+    let usual = median(steps.clone());
     let uneven = steps.iter().filter(|step| (**step - usual).abs() > JITTER * usual).count();
     let bad = usual <= 0.0 || steps.iter().any(|step| *step <= 0.0 || *step > GAP * usual);
     if bad || uneven as f64 <= MOST_UNEVEN * steps.len() as f64 {
