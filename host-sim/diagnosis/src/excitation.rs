@@ -38,8 +38,7 @@ const COHERENT: f64 = 0.5;
 pub fn order_of_excitation(record: &Record) -> usize {
     let mut gram = DMatrix::<f64>::zeros(LAGS, LAGS);
     for Segment { reference, .. } in &record.segments {
-        let steps: Vec<f64> = reference.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        for window in steps.windows(LAGS) {
+        for window in increments(reference).windows(LAGS) {
             for i in 0..LAGS {
                 for j in 0..LAGS {
                     gram[(i, j)] += window[i] * window[j];
@@ -68,18 +67,26 @@ fn lag(record: &Record, most: usize, of: impl Fn(&[f64]) -> Vec<f64>) -> usize {
     let most = most.min(record.longest() / 4);
     let columns: Vec<[Vec<f64>; 2]> =
         record.segments.iter().map(|Segment { reference, measured }| [of(reference), of(measured)]).collect();
-    let alike = |lag: usize| -> f64 {
-        let of = |[reference, measured]: &[Vec<f64>; 2]| -> f64 {
-            reference.iter().zip(measured.iter().skip(lag)).map(|(reference, measured)| reference * measured).sum()
-        };
+    most_alike(most, |lag| {
         let count: usize = columns.iter().map(|[reference, _]| reference.len().saturating_sub(lag)).sum();
-        columns.iter().map(of).sum::<f64>().abs() / count.max(1) as f64
-    };
-    let best = (0..=most).map(|lag| (lag, alike(lag))).max_by(|a, b| a.1.total_cmp(&b.1));
-    best.map_or(0, |(lag, _)| lag)
+        alike(&columns, lag) / count.max(1) as f64
+    })
 }
 
-fn increments(values: &[f64]) -> Vec<f64> {
+/// The lag, `most` at most, at which so much is largest.
+pub(crate) fn most_alike(most: usize, alike: impl Fn(usize) -> f64) -> usize {
+    (0..=most).map(|lag| (lag, alike(lag))).max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(lag, _)| lag)
+}
+
+/// How much columns have in common at a lag of the second: magnitude of the sum of their products.
+pub(crate) fn alike(columns: &[[Vec<f64>; 2]], lag: usize) -> f64 {
+    let of = |[reference, measured]: &[Vec<f64>; 2]| -> f64 {
+        reference.iter().zip(measured.iter().skip(lag)).map(|(reference, measured)| reference * measured).sum()
+    };
+    columns.iter().map(of).sum::<f64>().abs()
+}
+
+pub(crate) fn increments(values: &[f64]) -> Vec<f64> {
     values.windows(2).map(|pair| pair[1] - pair[0]).collect()
 }
 

@@ -15,6 +15,7 @@ use rayon::prelude::*;
 
 use crate::{
     arx::Arx,
+    excitation::{alike, increments, most_alike},
     output_error::{Candidate, Whitened, coefficients},
     polynomial::is_stable,
     record::{Record, Segment},
@@ -75,16 +76,10 @@ const MOST_MEMBERS: usize = 12;
 /// twice as late and more: a loop answers before that.
 fn longest_dead_time(record: &Record) -> usize {
     let most = (record.shortest() / 6).min(LATEST);
-    let alike = |lag: usize| -> f64 {
-        let of = |segment: &Segment| -> f64 {
-            let moved = |values: &[f64], tick: usize| values[tick + 1] - values[tick];
-            let ticks = 0..segment.reference.len().saturating_sub(lag + 1);
-            ticks.map(|tick| moved(&segment.reference, tick) * moved(&segment.measured, tick + lag)).sum()
-        };
-        record.segments.iter().map(of).sum::<f64>().abs()
-    };
-    let best = (0..=most).map(|lag| (lag, alike(lag))).max_by(|a, b| a.1.total_cmp(&b.1));
-    best.map_or(LONGEST_DEAD_TIME, |(lag, _)| if lag >= 2 * LONGEST_DEAD_TIME { lag } else { LONGEST_DEAD_TIME })
+    let moved = |Segment { reference, measured }: &Segment| [increments(reference), increments(measured)];
+    let moved: Vec<[Vec<f64>; 2]> = record.segments.iter().map(moved).collect();
+    let lag = most_alike(most, |lag| alike(&moved, lag));
+    if lag >= 2 * LONGEST_DEAD_TIME { lag } else { LONGEST_DEAD_TIME }
 }
 
 /// Identifies the channel; `None` if no stable model explains anything.
@@ -179,7 +174,7 @@ fn members(whitened: &Whitened, candidates: &[Candidate], chosen: usize) -> (Vec
         .map(|(weight, index)| Member {
             weight: weight / total,
             model: candidates[index].model.clone(),
-            covariance: whitened.robust(&candidates[index]),
+            covariance: if index == chosen { robust.clone() } else { whitened.robust(&candidates[index]) },
         })
         .collect();
     (members, rivals)
@@ -214,32 +209,23 @@ impl Identified {
     /// Draws from each member's distribution, in the number that its weight asks for. One that could not be the true one, because
     /// it is unstable or leaves much more of the record, is drawn half as far from the middle, and again.
     pub fn draws(&self, record: &Record, count: usize, random: &mut impl Rng) -> Draws {
-        let (mut all, mut weight) = (Draws { models: Vec::with_capacity(count), lost: 0.0 }, 0.0);
+        let bound = WORSE * level(&mut self.model.clone(), record);
+        let (mut models, mut lost, mut weight) = (Vec::with_capacity(count), 0usize, 0.0);
         for member in &self.members {
             weight += member.weight;
-            let wanted = ((weight * count as f64).round() as usize).min(count) - all.models.len();
-            let Draws { models, lost } = self.draws_of(member, record, wanted, random);
-            all.lost += lost * wanted as f64 / count as f64;
-            all.models.extend(models);
-        }
-        all
-    }
-
-    /// The same of one form.
-    pub fn draws_of(&self, member: &Member, record: &Record, count: usize, random: &mut impl Rng) -> Draws {
-        let bound = WORSE * level(&mut self.model.clone(), record);
-        let (root, centre) = (root(&member.covariance), coefficients(&member.model));
-        let (mut models, mut lost) = (Vec::with_capacity(count), 0usize);
-        for _ in 0..count {
-            let normal = DVector::from_fn(centre.len(), |_, _| StandardNormal.sample(random));
-            let mut away = &root * normal;
-            let found = (0..HALVINGS).find_map(|_| {
-                let mut model = member.model.with(&(&centre + &away));
-                away *= 0.5;
-                (is_stable(&model.denominator) && level(&mut model, record) <= bound).then_some(model)
-            });
-            lost += usize::from(found.is_none());
-            models.push(found.unwrap_or_else(|| self.model.clone()));
+            let wanted = ((weight * count as f64).round() as usize).min(count) - models.len();
+            let (root, centre) = (root(&member.covariance), coefficients(&member.model));
+            for _ in 0..wanted {
+                let normal = DVector::from_fn(centre.len(), |_, _| StandardNormal.sample(random));
+                let mut away = &root * normal;
+                let found = (0..HALVINGS).find_map(|_| {
+                    let mut model = member.model.with(&(&centre + &away));
+                    away *= 0.5;
+                    (is_stable(&model.denominator) && level(&mut model, record) <= bound).then_some(model)
+                });
+                lost += usize::from(found.is_none());
+                models.push(found.unwrap_or_else(|| self.model.clone()));
+            }
         }
         Draws { lost: lost as f64 / count.max(1) as f64, models }
     }

@@ -10,6 +10,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 
 use crate::{
+    columns::mean,
+    excitation::increments,
     identification::{Identified, Member},
     record::{Record, Segment},
     transfer_function::TransferFunction,
@@ -279,8 +281,8 @@ fn zeros(model: &TransferFunction, draws: &[TransferFunction], period_s: f64) ->
 fn motion(record: &Record) -> f64 {
     let (mut speeds, mut distances) = (0.0, 0.0);
     for Segment { reference, .. } in &record.segments {
-        let mean = reference.iter().sum::<f64>() / reference.len().max(1) as f64;
-        speeds += reference.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum::<f64>();
+        let mean = mean(reference);
+        speeds += increments(reference).iter().map(|step| step.powi(2)).sum::<f64>();
         distances += reference.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
     }
     (speeds / distances).sqrt().clamp(1e-6, 1.0)

@@ -75,11 +75,11 @@ pub enum RecordError {
 /// Fewest rows of a log.
 pub const FEWEST_ROWS: usize = 60;
 /// Largest deviation of a regular time step from the usual one, as a share of it.
-const JITTER: f64 = 0.25;
+pub(crate) const JITTER: f64 = 0.25;
 /// Longest step, in usual ones, that lost rows may leave; the line between its ends fills it.
-const LONGEST_GAP: f64 = 8.5;
+pub(crate) const LONGEST_GAP: f64 = 8.5;
 /// Share of steps that may be irregular.
-const MOST_UNEVEN: f64 = 0.03;
+pub(crate) const MOST_UNEVEN: f64 = 0.03;
 
 impl Record {
     /// A record of one stretch; the period is the median step.
@@ -198,21 +198,27 @@ impl Record {
 
 /// The stretch at a uniform rate, by lines between its rows.
 fn filled(time: &[f64], segment: &Segment, period_s: f64) -> Segment {
-    let last = time.len() - 1;
-    let count = ((time[last] - time[0]) / period_s + 1e-6) as usize + 1;
+    let count = ((time[time.len() - 1] - time[0]) / period_s + 1e-6) as usize + 1;
+    let places = places(time, period_s, count);
+    Segment { reference: between(&segment.reference, &places), measured: between(&segment.measured, &places) }
+}
+
+/// Where the ticks of a uniform rate lie between rows: the row before, and which share of the way to the next.
+pub(crate) fn places(time: &[f64], period_s: f64, count: usize) -> Vec<(usize, f64)> {
     let mut row = 0;
-    let mut filled = Segment::default();
-    for tick in 0..count {
+    let place = |tick: usize| {
         let now = time[0] + tick as f64 * period_s;
         while row + 2 < time.len() && time[row + 1] <= now {
             row += 1;
         }
-        let share = ((now - time[row]) / (time[row + 1] - time[row])).clamp(0.0, 1.0);
-        let between = |values: &[f64]| values[row] + share * (values[row + 1] - values[row]);
-        filled.reference.push(between(&segment.reference));
-        filled.measured.push(between(&segment.measured));
-    }
-    filled
+        (row, ((now - time[row]) / (time[row + 1] - time[row])).clamp(0.0, 1.0))
+    };
+    (0..count).map(place).collect()
+}
+
+/// Values at places between rows, on straight lines.
+pub(crate) fn between(values: &[f64], places: &[(usize, f64)]) -> Vec<f64> {
+    places.iter().map(|&(row, share)| values[row] + share * (values[row + 1] - values[row])).collect()
 }
 
 fn decimated(values: &[f64], divisor: usize) -> Vec<f64> {

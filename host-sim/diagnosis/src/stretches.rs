@@ -3,7 +3,10 @@
 //! *in* columns; *out* the same without time on the ground, at one rate, and what was done in words; *never* a stretch cut that a
 //! loop at rest may have made; *source* ours.
 
-use crate::columns::{Columns, median};
+use crate::{
+    columns::{Columns, median},
+    record::{JITTER, LONGEST_GAP, MOST_UNEVEN, between, places},
+};
 
 /// Fewest rows of a stretch at an end of a log, and its least share of the log.
 const FEWEST: usize = 20;
@@ -68,35 +71,20 @@ fn extent(values: &[f64]) -> f64 {
     (high - low).max(0.0)
 }
 
-/// Largest deviation of an even step from the usual one, as a share of it, and share of steps that may deviate more.
-const JITTER: f64 = 0.25;
-const MOST_UNEVEN: f64 = 0.03;
-/// A step of more usual ones is a gap, which no line fills.
-const GAP: f64 = 8.5;
-
 /// Brings rows that come unevenly, or of which many are lost, to one rate by straight lines between them.
 pub(crate) fn evened(mut columns: Columns, notes: &mut Vec<String>) -> Columns {
     let steps: Vec<f64> = columns.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let usual = median(steps.clone());
     let uneven = steps.iter().filter(|step| (**step - usual).abs() > JITTER * usual).count();
-    let bad = usual <= 0.0 || steps.iter().any(|step| *step <= 0.0 || *step > GAP * usual);
+    let bad = usual <= 0.0 || steps.iter().any(|step| *step <= 0.0 || *step > LONGEST_GAP * usual);
     if bad || uneven as f64 <= MOST_UNEVEN * steps.len() as f64 {
         return columns;
     }
     let (first, last) = (columns.time[0], columns.time[columns.time.len() - 1]);
     let ticks: f64 = steps.iter().map(|step| (step / usual).round()).sum();
     let period = (last - first) / ticks.max(1.0);
-    let (mut row, mut places) = (0, Vec::with_capacity(ticks as usize + 1));
-    for tick in 0..=ticks as usize {
-        let now = first + tick as f64 * period;
-        while row + 2 < columns.time.len() && columns.time[row + 1] <= now {
-            row += 1;
-        }
-        places.push((row, ((now - columns.time[row]) / steps[row]).clamp(0.0, 1.0)));
-    }
-    let between = |values: &[f64]| -> Vec<f64> {
-        places.iter().map(|(row, share)| values[*row] + share * (values[row + 1] - values[*row])).collect()
-    };
+    let places = places(&columns.time, period, ticks as usize + 1);
+    let between = |values: &[f64]| between(values, &places);
     let percent = 100.0 * uneven as f64 / steps.len() as f64;
     notes.push(format!(
         "{percent:.0} % of the rows come early, late or not at all: brought to {:.4} Hz by straight lines between them",

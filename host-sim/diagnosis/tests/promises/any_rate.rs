@@ -13,6 +13,8 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::{Distribution as _, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use crate::loops::product;
+
 /// A loop and how it is logged.
 #[derive(Clone, Debug)]
 pub(crate) struct Logged {
@@ -210,16 +212,6 @@ impl Logged {
         let away = answer.iter().rposition(|value| (value - self.gain).abs() > 0.02 * range);
         away.map_or(0.0, |row| row as f64 / self.rate_hz)
     }
-}
-
-fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
-    let mut result = vec![0.0; a.len() + b.len() - 1];
-    for (i, x) in a.iter().enumerate() {
-        for (j, y) in b.iter().enumerate() {
-            result[i + j] += x * y;
-        }
-    }
-    result
 }
 
 /// gain B(s)/F(s), rising powers, with a reference that is held between rows: exact, by the exponential of states and input.

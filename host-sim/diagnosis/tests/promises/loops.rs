@@ -25,7 +25,7 @@ pub(crate) struct Known {
 /// Ticks of 20 ms.
 pub(crate) const PERIOD: f64 = 0.02;
 
-fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
+pub(crate) fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
     let mut result = vec![0.0; a.len() + b.len() - 1];
     for (i, x) in a.iter().enumerate() {
         for (j, y) in b.iter().enumerate() {
