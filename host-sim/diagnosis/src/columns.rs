@@ -15,8 +15,28 @@ pub struct Columns {
     pub measured: Vec<f64>,
     /// Its rate of change, if the log has it.
     pub rate: Option<Vec<f64>>,
+    /// What was desired, where that is not the reference.
+    pub desired: Option<Vec<f64>>,
+    /// Further columns, which are cut and filled as these.
+    pub others: Vec<Vec<f64>>,
     /// Whether a time is written with a decimal point or an exponent, as seconds are.
     pub decimal: bool,
+}
+
+impl Columns {
+    /// The same lines with every column through `change`.
+    pub(crate) fn each(&self, lines: Vec<u64>, change: impl Fn(&[f64]) -> Vec<f64>) -> Self {
+        Self {
+            lines,
+            time: change(&self.time),
+            reference: change(&self.reference),
+            measured: change(&self.measured),
+            rate: self.rate.as_deref().map(&change),
+            desired: self.desired.as_deref().map(&change),
+            others: self.others.iter().map(|values| change(values)).collect(),
+            decimal: self.decimal,
+        }
+    }
 }
 
 /// The middle one of values, 0 of none.

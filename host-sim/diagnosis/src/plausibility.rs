@@ -151,7 +151,7 @@ pub(crate) fn moves(values: &[f64]) -> bool {
 
 /// Rows of the same time and values as the one before are the same row.
 fn without_repetitions(columns: Columns, notes: &mut Vec<String>) -> Result<Columns, Implausible> {
-    let Columns { lines, time, reference, measured, rate, decimal } = &columns;
+    let Columns { lines, time, reference, measured, rate, .. } = &columns;
     let (mut kept, mut first) = (Vec::with_capacity(time.len()), None);
     for row in 0..time.len() {
         match row.checked_sub(1) {
@@ -167,15 +167,8 @@ fn without_repetitions(columns: Columns, notes: &mut Vec<String>) -> Result<Colu
     }
     let Some(line) = first else { return Ok(columns) };
     notes.push(format!("{} row(s) that repeat the one before were left out, the first in line {line}", time.len() - kept.len()));
-    let pick = |values: &[f64]| kept.iter().map(|row| values[*row]).collect();
-    Ok(Columns {
-        lines: kept.iter().map(|row| lines[*row]).collect(),
-        time: pick(time),
-        reference: pick(reference),
-        measured: pick(measured),
-        rate: rate.as_deref().map(pick),
-        decimal: *decimal,
-    })
+    let picked = kept.iter().map(|row| lines[*row]).collect();
+    Ok(columns.each(picked, |values| kept.iter().map(|row| values[*row]).collect()))
 }
 
 /// Times in seconds. Loggers write whole numbers of milli-, micro- or nanoseconds; a loop of a row a second and slower is rare,
@@ -229,6 +222,11 @@ fn unwrap(columns: &mut Columns, notes: &mut Vec<String>) {
     let between: Vec<f64> = columns.reference.iter().zip(&columns.measured).map(|(r, y)| r - y).collect();
     let turns = (median(between) / turn).round() * turn;
     columns.reference.iter_mut().for_each(|value| *value -= turns);
+    if let Some(desired) = &mut columns.desired {
+        follow(desired, turn);
+        let turns = (median(desired.iter().zip(&columns.reference).map(|(d, r)| d - r).collect()) / turn).round() * turn;
+        desired.iter_mut().for_each(|value| *value -= turns);
+    }
     notes.push(format!("an angle that wraps ({wraps} times) was unwrapped"));
 }
 

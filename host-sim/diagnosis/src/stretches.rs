@@ -55,15 +55,7 @@ pub(crate) fn airborne(columns: Columns, notes: &mut Vec<String>) -> Columns {
             lines[to]
         ));
     }
-    let cut = |values: &[f64]| values[from..to].to_vec();
-    Columns {
-        lines: lines[from..to].to_vec(),
-        time: cut(&columns.time),
-        reference: cut(reference),
-        measured: cut(measured),
-        rate: columns.rate.as_deref().map(cut),
-        decimal: columns.decimal,
-    }
+    columns.each(lines[from..to].to_vec(), |values| values[from..to].to_vec())
 }
 
 fn extent(values: &[f64]) -> f64 {
@@ -90,10 +82,8 @@ pub(crate) fn evened(mut columns: Columns, notes: &mut Vec<String>) -> Columns {
         "{percent:.0} % of the rows come early, late or not at all: brought to {:.4} Hz by straight lines between them",
         1.0 / period
     ));
-    columns.reference = between(&columns.reference);
-    columns.measured = between(&columns.measured);
-    columns.rate = columns.rate.as_deref().map(between);
-    columns.lines = places.iter().map(|(row, _)| columns.lines[*row]).collect();
+    let lines = places.iter().map(|(row, _)| columns.lines[*row]).collect();
+    columns = columns.each(lines, between);
     columns.time = (0..places.len()).map(|tick| first + tick as f64 * period).collect();
     columns
 }

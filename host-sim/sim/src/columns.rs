@@ -123,6 +123,11 @@ impl<R: io::Read> Table<R> {
         &self.file
     }
 
+    /// Names of the columns.
+    pub fn header(&self) -> impl Iterator<Item = &str> {
+        self.header.iter()
+    }
+
     /// Place of a column, if there is one of that name.
     pub fn find(&self, column: &str) -> Option<usize> {
         self.header.iter().position(|name| name == column)

@@ -1,5 +1,6 @@
 //! `host-sim train`: flight logs to a model.
 
+mod any_loop;
 mod columns;
 
 use std::path::{Path, PathBuf};
@@ -20,6 +21,7 @@ use super::{
     Invocation,
     configuration::checked,
     learned_file::kept,
+    log_reading::LogReading,
     output::table,
     situation::{closed_loop, controller, flown_by, gains_conflict, milliseconds},
 };
@@ -31,6 +33,16 @@ pub(super) struct Train {
     /// Flight logs of the baseline; two at least, every fourth one decides when to stop.
     #[arg(long, value_name = "FILE.csv", required_unless_present = "learned", num_args = 1..)]
     log: Vec<PathBuf>,
+    /// Loop of the logs: `quadrotor`, or a description (`host-sim describe` drafts one). Both lanes, limits and monitor come from
+    /// the logs alone.
+    #[arg(long = "loop", value_name = "NAME|FILE.toml")]
+    #[arg(conflicts_with_all = ["vehicle", "learned", "dithered", "smoothing_ms", "recipe"])]
+    described: Option<String>,
+    /// With --loop: axes that are trained; the others get what is desired [default: all].
+    #[arg(long, value_name = "AXIS", num_args = 1.., requires = "described")]
+    axis: Vec<String>,
+    #[command(flatten)]
+    reading: LogReading,
     /// Instead of logs, what was learned in flight without a model (`fly --keep`, or sent by a vehicle): its preview part becomes
     /// the network, the prior of what is learned next.
     #[arg(long, value_name = "FILE.learned", requires = "vehicle")]
@@ -123,6 +135,9 @@ struct Origin {
 impl Train {
     pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
         let seed = invocation.configuration.seed();
+        if let Some(described) = &self.described {
+            return any_loop::run(&self, described, invocation);
+        }
         let recipe: Recipe = match &self.recipe {
             Some(path) => checked(path).context("--recipe")?,
             None => invocation.configuration.recipe().clone(),

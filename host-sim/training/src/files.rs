@@ -9,7 +9,7 @@ use impromptu_files::{
 };
 use impromptu_firmware::features::{Feature, Relative, Source};
 use impromptu_model_export::{
-    Description,
+    Description, FloatNetwork,
     description::{ChannelDescription, Signals, Tie},
 };
 
@@ -45,9 +45,23 @@ pub fn write_model_files(
     description: &Description,
     model: &[u8],
 ) -> Result<Vec<PathBuf>> {
-    let network = learned.exported.to_bytes().context("network")?;
-    let rows = rows(learned, description)?;
-    let tie = Tie::of(&learned.exported, &learned.rows.calibration);
+    write_set(folder, name, (&learned.exported, &learned.rows.calibration), description, model)
+}
+
+/// The same of a network and its calibration rows.
+///
+/// # Errors
+/// As [`write_model_files`].
+pub fn write_set(
+    folder: &Path,
+    name: &str,
+    (network, calibration): (&FloatNetwork, &[Vec<f32>]),
+    description: &Description,
+    model: &[u8],
+) -> Result<Vec<PathBuf>> {
+    let tie = Tie::of(network, calibration);
+    let network = network.to_bytes().context("network")?;
+    let rows = rows(calibration, description)?;
     let description = Description { tie: Some(tie), ..description.clone() }.to_json();
     let paths = model_files(folder, name)?;
     let contents: [&[u8]; 4] = [&network, description.as_bytes(), &rows, model];
@@ -65,10 +79,10 @@ pub fn model_files(folder: &Path, name: &str) -> Result<Vec<PathBuf>> {
 }
 
 /// The calibration rows, a column for each feature.
-fn rows(learned: &Learned, description: &Description) -> Result<Vec<u8>> {
+fn rows(calibration: &[Vec<f32>], description: &Description) -> Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(description.features.iter().map(|feature| column(feature, &description.signals)))?;
-    for row in &learned.rows.calibration {
+    for row in calibration {
         writer.write_record(row.iter().map(f32::to_string))?;
     }
     writer.into_inner().context("calibration rows")

@@ -11,6 +11,8 @@ fn columns(rows: usize) -> Columns {
         measured: time.iter().map(|t| tones(*t - 0.3)).collect(),
         time,
         rate: None,
+        desired: None,
+        others: Vec::new(),
         decimal: true,
     }
 }
@@ -125,6 +127,8 @@ proptest! {
             reference: pick(|row| row.1),
             measured: pick(|row| row.2),
             rate: None,
+            desired: None,
+            others: Vec::new(),
             decimal,
         };
         if let Ok((found, _)) = read(columns) {
@@ -149,6 +153,8 @@ fn with_ground(before: usize, after: usize) -> Columns {
         reference: padded(&all.reference, 0.0, 0.0),
         measured: padded(&all.measured, first, last),
         rate: None,
+        desired: None,
+        others: Vec::new(),
         decimal: true,
     }
 }
@@ -207,6 +213,8 @@ proptest! {
             measured: time.iter().map(|t| tones(*t - 0.3)).collect(),
             time,
             rate: None,
+            desired: None,
+            others: Vec::new(),
             decimal: true,
         };
         let (found, notes) = read(columns).unwrap();

@@ -68,20 +68,7 @@ impl IdentificationData {
         }
         let columns = Columns { lags: longest_lags };
         let width = columns.regressors() + 2;
-        let mut products = Regression::new(width, 0);
-        let mut block = DMatrix::zeros(width, ROWS_AT_A_TIME);
-        let mut filled = 0;
-        for log in logs {
-            for k in columns.ticks(log.measured_position.len()) {
-                columns.fill(log, k, block.column_mut(filled).as_mut_slice());
-                filled += 1;
-                if filled == ROWS_AT_A_TIME {
-                    products.push_block(block.as_view(), &DMatrix::zeros(filled, 0), None);
-                    filled = 0;
-                }
-            }
-        }
-        products.push_block(block.columns(0, filled), &DMatrix::zeros(filled, 0), None);
+        let products = products(logs, columns);
 
         // Fewer rows than this leave more than a fifth of each coefficient to chance.
         let needed = 5 * width;
@@ -90,6 +77,22 @@ impl IdentificationData {
         }
         let excitation = excitation::measure(logs, columns, &products)?;
         Ok(Self { columns, products, excitation })
+    }
+
+    /// Sums of products of each log by itself, for models of up to `longest_lags` lags: what [`Self::resampled`] draws from.
+    pub fn sums(logs: &[AxisLog], longest_lags: usize) -> Vec<Regression> {
+        logs.iter().map(|log| products(std::slice::from_ref(log), Columns { lags: longest_lags })).collect()
+    }
+
+    /// The same with other sums: those of logs drawn with replacement.
+    #[must_use]
+    pub fn resampled<'a>(&self, sums: impl Iterator<Item = &'a Regression>) -> Self {
+        let mut products = Regression::new(self.products.gram.nrows(), 0);
+        for sum in sums {
+            products.gram += &sum.gram;
+            products.rows += sum.rows;
+        }
+        Self { products, ..self.clone() }
     }
 
     /// Rows (ticks with a full past) that were collected.
@@ -151,6 +154,26 @@ impl IdentificationData {
         let velocity = equation(columns, &solve(1), 0.0);
         Ok(ArxModel { position, velocity, residual })
     }
+}
+
+/// Sums of products of all rows of all logs.
+fn products(logs: &[AxisLog], columns: Columns) -> Regression {
+    let width = columns.regressors() + 2;
+    let mut products = Regression::new(width, 0);
+    let mut block = DMatrix::zeros(width, ROWS_AT_A_TIME);
+    let mut filled = 0;
+    for log in logs {
+        for k in columns.ticks(log.measured_position.len()) {
+            columns.fill(log, k, block.column_mut(filled).as_mut_slice());
+            filled += 1;
+            if filled == ROWS_AT_A_TIME {
+                products.push_block(block.as_view(), &DMatrix::zeros(filled, 0), None);
+                filled = 0;
+            }
+        }
+    }
+    products.push_block(block.columns(0, filled), &DMatrix::zeros(filled, 0), None);
+    products
 }
 
 /// Splits solved coefficients into signals and gives the newest position what translation invariance leaves to it:

@@ -15,6 +15,17 @@ pub fn box_responses(model: &ArxModel, divisor: usize, taps: usize) -> [Vec<f64>
     [simulate(model, &|tick| [pulse(tick), 0.0], divisor, taps), simulate(model, &|tick| [0.0, pulse(tick)], divisor, taps)]
 }
 
+/// The measured position at each tick from the one on in which the position reference is 1 for one tick.
+pub fn impulse_response(model: &ArxModel, ticks: usize) -> Vec<f64> {
+    simulate(model, &|tick| [f64::from(u8::from(tick == 0)), 0.0], 1, ticks)
+}
+
+/// The position to which a velocity reference of 1 leads in the end, s: what it weighs beside the position reference, so far as the
+/// loop adds the two up before anything else.
+pub fn velocity_weight(model: &ArxModel, ticks: usize) -> f64 {
+    simulate(model, &|_| [0.0, 1.0], 1, ticks).last().copied().unwrap_or(0.0)
+}
+
 fn simulate(model: &ArxModel, reference: &dyn Fn(usize) -> [f64; 2], divisor: usize, taps: usize) -> Vec<f64> {
     let ticks = divisor * taps;
     let references: Vec<[f64; 2]> = (0..ticks).map(reference).collect();

@@ -1,0 +1,35 @@
+//! Any loop, from its description and its own logs to a model.
+//!
+//! ```text
+//! loop.toml ─► description ─► layout ────────────────────────────┐
+//! logs ─► reading ─► models ─┬─► window ─► network lane ─────────┼─► training ─► model file
+//!                            ├─► design ─► feedback lane ────────┤
+//!                            └─► replay: what both would have left of the logs kept apart
+//! ```
+//!
+//! *in* a description and logs of any loop with 1 to 8 axes; *out* a model with both lanes, limits and monitor; *never* a simulated
+//! vehicle; *source* Zhou 2017, sections III and V.
+//!
+//! | layer | modules | what they hold |
+//! |---|---|---|
+//! | 0 | `description` | a loop in words |
+//! | 1 | `draft`, `layout`, `reading`, `response` | a description from a header; channels of its model; its logs; its answers |
+//! | 2 | `built_in` | loops that need no file |
+//! | 2 | `models`, `replay` | what the logs leave possible; flights on it |
+//! | 3 | `window`, `design` | the network lane; the feedback lane and its choice |
+//! | 4 | `training` | from logs to a model file |
+
+pub mod built_in;
+pub mod description;
+pub mod design;
+pub mod draft;
+pub mod layout;
+pub mod models;
+pub mod reading;
+pub mod replay;
+pub mod response;
+pub mod training;
+pub mod window;
+
+pub use description::LoopDescription;
+pub use training::{Settings, TrainError, Trained, train};

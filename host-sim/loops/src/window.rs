@@ -1,0 +1,146 @@
+//! The network lane of an axis: a window over the desired position, fitted to the errors that the loop itself left.
+//!
+//! *in* logs of an axis and a model of it; *out* weights of the window; *never* a correction learned from noise in its own inputs:
+//! these are the desired trajectory, which has none; *source* Zhou 2017, Insight 3 (difference learning): features relative to
+//! now. What differs: the paper learns the inverse with the measured output in the place of the desired one; here the error that
+//! was logged is regressed on what the window would have done to it through the identified loop (filtered-x, Widrow and Walach
+//! 1996), which needs no stable inverse and is not biased by measurement noise.
+
+use impromptu_diagnosis::least_squares::Regression;
+use impromptu_training::feedback_design::ArxModel;
+
+use crate::{
+    reading::{AxisSignals, at},
+    response::response,
+};
+
+/// Offsets of the window of a loop with a time constant of 70 ticks, and that lag.
+const OFFSETS: [i32; 30] = [
+    -60, -50, -42, -36, -30, -25, -20, -16, -12, -8, -4, 4, 8, 12, 16, 20, 24, 28, 32, 36, 40, 44, 48, 52, 56, 60, 65, 70, 76, 84,
+];
+const LAG: f64 = 70.0;
+
+/// Offsets, ticks, of a loop that lags by so many ticks: whole sub-rate ticks, none of them the present, within the ticks of the
+/// past and the future that the application keeps.
+pub fn offsets(lag_ticks: f64, divisor: i32, [past, future]: [i32; 2]) -> Vec<i32> {
+    let mut offsets: Vec<i32> = OFFSETS
+        .iter()
+        .map(|&offset| {
+            let ticks = f64::from(offset) * lag_ticks / LAG / f64::from(divisor);
+            divisor * (ticks.abs().ceil() as i32) * offset.signum()
+        })
+        .map(|ticks| ticks.clamp(-past / divisor * divisor, future / divisor * divisor))
+        .collect();
+    offsets.dedup();
+    offsets
+}
+
+/// Weights of a window.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Window {
+    /// Offset, ticks, and weight of each desired position relative to now.
+    pub weights: Vec<(i32, f64)>,
+    /// Correction that is always there.
+    pub constant: f64,
+    /// Least and greatest value of each relative position in the logs.
+    pub envelope: Vec<(f64, f64)>,
+    /// Largest correction over the logs.
+    pub largest: f64,
+}
+
+/// Rows of relative desired positions at a tick; the trajectory rests beyond its ends.
+fn relative(desired: &[f64], offsets: &[i32], tick: usize) -> Vec<f64> {
+    let last = desired.len() as i32 - 1;
+    offsets.iter().map(|offset| desired[(tick as i32 + offset).clamp(0, last) as usize] - desired[tick]).collect()
+}
+
+/// A signal through a response.
+fn filtered(response: &[f64], values: &[f64]) -> Vec<f64> {
+    (0..values.len())
+        .map(|tick| response.iter().take(tick + 1).enumerate().map(|(lag, weight)| weight * values[tick - lag]).sum())
+        .collect()
+}
+
+/// Sums of a log: columns are the window's and the constant's.
+fn sums(signals: &AxisSignals, offsets: &[i32], response: &[f64], age_ticks: f64) -> Regression {
+    let ticks = signals.len();
+    // The desired position through the response once, as far as the window looks beyond the ends, where it rests.
+    let ends = [offsets.iter().copied().min().unwrap_or(0).min(0), offsets.iter().copied().max().unwrap_or(0).max(0)];
+    let held = (ends[0]..ticks as i32 + ends[1]).map(|tick| signals.desired[tick.clamp(0, ticks as i32 - 1) as usize]);
+    let answered = filtered(response, &held.collect::<Vec<_>>());
+    let dither: Vec<f64> = signals.reference.iter().zip(&signals.base).map(|(reference, base)| reference - base).collect();
+    let of_dither = filtered(response, &dither);
+    let gain = response.iter().sum::<f64>();
+    let mut regression = Regression::new(offsets.len() + 1, 1);
+    let mut row = vec![gain; offsets.len() + 1];
+    for tick in response.len()..ticks {
+        let now = (tick as i32 - ends[0]) as usize;
+        for (value, offset) in row.iter_mut().zip(offsets) {
+            *value = answered[(now as i32 + offset) as usize] - answered[now];
+        }
+        let error = signals.measured[tick] - at(&signals.desired, tick as f64 - age_ticks) - of_dither[tick];
+        regression.push(&row, &[-error]);
+    }
+    regression
+}
+
+/// Penalties tried, relative to each column's mean square.
+const PENALTIES: [f64; 7] = [1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
+
+/// The window that would have left least of the logged errors; which penalty, logs decide that were not fitted.
+pub fn fit(logs: &[&AxisSignals], model: &ArxModel, offsets: &[i32], age_ticks: f64, longest: usize) -> Option<Window> {
+    let response = response(model, longest);
+    let all: Vec<Regression> =
+        logs.iter().filter(|signals| signals.len() > 2 * response.len()).map(|log| sums(log, offsets, &response, age_ticks)).collect();
+    let columns = offsets.len() + 1;
+    let joined = |left_out: Option<usize>| {
+        let mut joined = Regression::new(columns, 1);
+        for (_, sums) in all.iter().enumerate().filter(|(index, _)| Some(*index) != left_out) {
+            joined.gram += &sums.gram;
+            joined.cross += &sums.cross;
+            joined.squares += &sums.squares;
+            joined.rows += sums.rows;
+        }
+        joined
+    };
+    let folds: Vec<Regression> = if all.len() > 1 { (0..all.len()).map(|index| joined(Some(index))).collect() } else { Vec::new() };
+    let missed = |penalty: f64| {
+        let errors = folds.iter().zip(&all).map(|(fold, left_out)| {
+            fold.solve(penalty).map_or(f64::INFINITY, |solution| left_out.residual(0, &solution.coefficients))
+        });
+        errors.sum::<f64>()
+    };
+    let penalty = PENALTIES.into_iter().min_by(|a, b| missed(*a).total_cmp(&missed(*b)))?;
+    let solution = joined(None).solve(penalty)?;
+    let (constant, weights) = solution.coefficients.as_slice().split_last()?;
+    let mut envelope = vec![(0.0f64, 0.0f64); offsets.len()];
+    let mut largest = 0.0f64;
+    for signals in logs {
+        for tick in 0..signals.len() {
+            let row = relative(&signals.desired, offsets, tick);
+            let correction: f64 = row.iter().zip(weights).map(|(value, weight)| value * weight).sum();
+            largest = largest.max((correction + constant).abs());
+            for ((low, high), value) in envelope.iter_mut().zip(row) {
+                (*low, *high) = (low.min(value), high.max(value));
+            }
+        }
+    }
+    Some(Window { weights: offsets.iter().copied().zip(weights.iter().copied()).collect(), constant: *constant, envelope, largest })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn offsets_are_whole_sub_rate_ticks_and_never_the_present() {
+        for (lag, divisor) in [(70.0, 2), (7.0, 1), (1.0, 1), (70.0, 5)] {
+            let found = offsets(lag, divisor, [400, 600]);
+            assert!(found.iter().all(|offset| *offset != 0 && offset % divisor == 0), "{found:?}");
+            assert!(found.windows(2).all(|pair| pair[0] < pair[1]), "{found:?}");
+        }
+        let near = offsets(70.0, 2, [45, 50]);
+        assert_eq!((near[0], *near.last().unwrap()), (-44, 50));
+        assert_eq!(offsets(70.0, 2, [400, 600]).len(), 30);
+    }
+}
