@@ -221,7 +221,8 @@ pub(crate) fn between(values: &[f64], places: &[(usize, f64)]) -> Vec<f64> {
     places.iter().map(|&(row, share)| values[row] + share * (values[row + 1] - values[row])).collect()
 }
 
-fn decimated(values: &[f64], divisor: usize) -> Vec<f64> {
+/// Every `divisor`-th value of a mean of as many, centred on it.
+pub fn decimated(values: &[f64], divisor: usize) -> Vec<f64> {
     // The half weights at the ends of an even mean keep it centred.
     let half = divisor as f64 / 2.0;
     let reach = half.floor() as usize;

@@ -9,7 +9,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 
-use crate::reading::AxisSignals;
+use crate::{reading::AxisSignals, response::Answer};
 
 /// Models of an axis.
 #[derive(Clone, Debug)]
@@ -36,44 +36,40 @@ pub fn axis_log(signals: &AxisSignals) -> AxisLog<'_> {
     }
 }
 
-/// Ratios tried, in time constants of the loop.
-const RATIOS: [f64; 9] = [0.1, 0.25, 0.4, 0.55, 0.7, 0.85, 1.0, 1.2, 1.5];
-/// A loop adds its references up if one combined explains what it does but for this share more of the residual.
-const MORE: f64 = 0.02;
+/// Ratios tried, in time constants of the loop: PD loops of little to much damping.
+const RATIOS: [f64; 8] = [0.5, 0.62, 0.74, 0.86, 0.98, 1.1, 1.25, 1.4];
+/// Ticks of logs that are looked at.
+const LOOKED_AT: usize = 30_000;
 
-/// What a velocity reference weighs beside the position reference, s, if the loop adds them up before anything else: the ratio at
-/// which one combined reference explains most. `None` if two explain more.
+/// What a velocity reference weighs beside the position reference, s, of a loop that adds them up before anything else: the ratio
+/// at which one combined reference explains most. `None` if none explains anything.
 pub fn ratio_of_references(logs: &[&AxisSignals], settings: &DesignSettings, time_constant_s: f64) -> Option<f64> {
-    let left = |logs: &[AxisSignals]| {
-        let all: Vec<AxisLog<'_>> = logs.iter().map(axis_log).collect();
-        let data = IdentificationData::collect(&all, settings.lags).ok()?;
-        let [position, velocity] = data.fit(settings.lags, [0.0; 2], settings.regularisation).ok()?.residual;
-        Some(if velocity > 0.0 { velocity } else { position })
-    };
-    let owned: Vec<AxisSignals> = logs.iter().map(|log| (*log).clone()).collect();
-    let free = left(&owned)?;
-    let of = |ratio: f64| {
+    let mut ticks = 0;
+    let enough = logs.iter().take_while(|log| {
+        let before = ticks;
+        ticks += log.len();
+        before < LOOKED_AT
+    });
+    let owned: Vec<AxisSignals> = enough.map(|log| (*log).clone()).collect();
+    let of = |share: &f64| {
         let mut combined = owned.clone();
-        combined.iter_mut().for_each(|signals| signals.combine(ratio));
-        left(&combined)
+        combined.iter_mut().for_each(|signals| signals.combine(share * time_constant_s));
+        let answer = Answer::of(&combined.iter().collect::<Vec<_>>(), 1.0 / settings.tick)?;
+        Some((*share, answer.unexplained))
     };
-    let found: Vec<(f64, f64)> = RATIOS
-        .par_iter()
-        .filter_map(|share| of(share * time_constant_s).map(|left| (share * time_constant_s, left)))
-        .collect();
+    let found: Vec<(f64, f64)> = RATIOS.par_iter().filter_map(of).collect();
     let best = found.iter().enumerate().min_by(|(_, a), (_, b)| a.1.total_cmp(&b.1)).map(|(index, _)| index)?;
-    let ratio = match (best.checked_sub(1).and_then(|before| found.get(before)), found.get(best + 1)) {
-        (Some(before), Some(after)) => lowest(*before, found[best], *after),
+    let share = match (best.checked_sub(1).and_then(|before| found.get(before)), found.get(best + 1)) {
+        (Some(before), Some(after)) => lowest([*before, found[best], *after]),
         _ => found[best].0,
     };
-    (of(ratio)? <= (1.0 + MORE) * free).then_some(ratio)
+    Some(share * time_constant_s)
 }
 
-/// Where the parabola through three points is lowest.
-fn lowest((a, at_a): (f64, f64), (b, at_b): (f64, f64), (c, at_c): (f64, f64)) -> f64 {
+/// Where the parabola through three points is lowest, of which the middle one is.
+fn lowest([(a, at_a), (b, at_b), (c, at_c)]: [(f64, f64); 3]) -> f64 {
     let (left, right) = ((b - a) * (at_b - at_c), (b - c) * (at_b - at_a));
-    let below = left - right;
-    if below == 0.0 { b } else { b - 0.5 * ((b - a) * left - (b - c) * right) / below }
+    if left == right { b } else { b - 0.5 * ((b - a) * left - (b - c) * right) / (left - right) }
 }
 
 impl Models {

@@ -129,7 +129,7 @@ impl<'a> Piece<'a> {
         for tick in first..ticks.saturating_sub(1) {
             let corrections = match &mut flies {
                 Some(flight) => flight.step(tick, self, &seen, case.delay),
-                None => vec![0.0; axes],
+                None => vec![[0.0; 2]; axes],
             };
             let scored = tick >= first + settled;
             judged += usize::from(scored);
@@ -137,10 +137,12 @@ impl<'a> Piece<'a> {
                 let signals = self.signals[axis];
                 let late = tick.saturating_sub(case.delay);
                 let ([position, velocity], [older, slower]) = (seen[axis][tick], seen[axis][late]);
-                let delta = case.gain * corrections[axis];
+                let [delta, rate] = corrections[axis].map(|correction| case.gain * correction);
+                // A combined reference takes the velocity's correction with the position's.
+                let apart = if signals.ratio > 0.0 { 0.0 } else { rate };
                 told[axis][tick] = [
-                    signals.base[tick] + delta + position - older + self.weights[axis] * (velocity - slower),
-                    signals.reference_velocity[tick],
+                    signals.base[tick] + delta + signals.ratio * rate + position - older + self.weights[axis] * (velocity - slower),
+                    signals.reference_velocity[tick] + apart,
                 ];
                 if scored {
                     squares[axis] += (position - at(&signals.desired, tick as f64 - age_ticks)).powi(2);
@@ -224,8 +226,8 @@ impl<'m, 'l> Flight<'m, 'l> {
         let _ = self.add_on.push(desired);
     }
 
-    /// Corrections of the axes at a tick.
-    fn step(&mut self, tick: usize, piece: &Piece<'_>, seen: &[Vec<[f64; 2]>], delay: usize) -> Vec<f64> {
+    /// Corrections of position and velocity of the axes at a tick.
+    fn step(&mut self, tick: usize, piece: &Piece<'_>, seen: &[Vec<[f64; 2]>], delay: usize) -> Vec<[f64; 2]> {
         while self.add_on.next_tick() <= tick as i32 + self.ahead {
             let tick = self.add_on.next_tick();
             self.push(tick, piece);
@@ -247,8 +249,10 @@ impl<'m, 'l> Flight<'m, 'l> {
             .axes
             .iter()
             .map(|channels| {
-                let [to, from] = [channels.reference[0], channels.desired[0]].map(|channel| usize::from(channel.unwrap_or(0)));
-                f64::from(reference[to]) - f64::from(desired[from])
+                [0, 1].map(|derivative| match (channels.reference[derivative], channels.desired[derivative]) {
+                    (Some(to), Some(from)) => f64::from(reference[usize::from(to)]) - f64::from(desired[usize::from(from)]),
+                    _ => 0.0,
+                })
             })
             .collect()
     }

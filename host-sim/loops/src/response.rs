@@ -3,10 +3,39 @@
 //! *in* an identified model; *out* responses and what is read off them; *never* a response of the desired trajectory; *source*
 //! superposition.
 
+use impromptu_diagnosis::{Record, Settings, assess, transfer_function::TransferFunction};
 use impromptu_training::feedback_design::{
     ArxModel,
     response::{impulse_response, velocity_weight},
 };
+
+use crate::reading::AxisSignals;
+
+/// The loop from its reference to what is measured, by output errors: measurement noise and disturbances do not bias it.
+#[derive(Clone, Debug)]
+pub struct Answer {
+    /// Ticks in one of the model's.
+    pub divisor: usize,
+    /// Model.
+    pub model: TransferFunction,
+    /// Standard deviation of what it leaves unexplained.
+    pub unexplained: f64,
+}
+
+impl Answer {
+    /// Of logs at this rate, Hz. `None` if no model explains them.
+    pub fn of(logs: &[&AxisSignals], rate_hz: f64) -> Option<Self> {
+        let records = logs.iter().filter_map(|signals| {
+            let time: Vec<f64> = (0..signals.len()).map(|tick| tick as f64 / rate_hz).collect();
+            Record::new(&time, &signals.reference, &signals.measured).ok()
+        });
+        let record = Record::joined(records).ok()?;
+        let found = assess(&record, &Settings { draws: 1, ..Settings::default() }).ok()?;
+        let divisor = (rate_hz / found.sub_rate_hz).round().max(1.0) as usize;
+        let model = TransferFunction { offset: 0.0, ..found.identified.model };
+        Some(Self { divisor, model, unexplained: found.properties.noise })
+    }
+}
 
 /// Share of a response's peak below which it has come to its end.
 const ENDED: f64 = 1e-3;

@@ -26,7 +26,7 @@ use crate::{
     layout::{Layout, TooManyChannels},
     models::{Models, ratio_of_references},
     reading::{AxisLog, AxisSignals},
-    response::{LONGEST, time_constant},
+    response::{Answer, time_constant},
     window::{Window, fit, offsets},
 };
 
@@ -283,12 +283,14 @@ pub fn train(described: &LoopDescription, logs: &[Vec<AxisLog>], settings: &Sett
     let windows = chosen
         .iter()
         .zip(&splits)
-        .zip(&models)
         .zip(&lags)
-        .map(|(((&place, split), models), lag)| {
+        .map(|((&place, split), lag)| {
+            let short = || TrainError::Short { axis: described.axes[place].name.clone() };
             let logs: Vec<&AxisSignals> = split.training.iter().collect();
-            let offsets = offsets(lag * model_hz, i32::from(sub), reach);
-            fit(&logs, &models.whole, &offsets, age_ticks, LONGEST).ok_or_else(|| TrainError::Short { axis: described.axes[place].name.clone() })
+            let answer = Answer::of(&logs, model_hz).ok_or_else(short)?;
+            let unit = lcm(answer.divisor as i32, i32::from(sub));
+            let offsets = offsets(lag * model_hz, unit, reach);
+            fit(&logs, &answer, &offsets, age_ticks, (lag * model_hz) as usize).ok_or_else(short)
         })
         .collect::<Result<Vec<Window>, _>>()?;
 
@@ -358,6 +360,15 @@ pub fn train(described: &LoopDescription, logs: &[Vec<AxisLog>], settings: &Sett
         notes.push(format!("the model runs at {model_hz:.4} Hz, each {divisor} ticks of a loop at {rate_hz:.4} Hz (`Divided` in the firmware)"));
     }
     Ok(Trained { description, network, rows, model, axes, divisor, minutes, notes })
+}
+
+/// Least common multiple.
+fn lcm(a: i32, b: i32) -> i32 {
+    let (mut high, mut low) = (a.max(b), a.min(b));
+    while low > 0 {
+        (high, low) = (low, high % low);
+    }
+    a / high.max(1) * b
 }
 
 /// A loop of which nothing is known is taken to lag by this, s.
@@ -497,31 +508,32 @@ struct Maker<'a> {
 
 impl Maker<'_> {
     fn features(&self) -> Vec<Feature> {
+        let sub = i32::from(self.sub);
         let of_axis = |(&place, window): (&usize, &Window)| {
             let channel = self.layout.axes[place].desired[0].unwrap_or(0);
-            let sub = i32::from(self.sub);
-            window
-                .weights
-                .iter()
-                .map(|(offset, _)| Feature { source: Source::Desired, channel, offset: (offset / sub) as i16, relative: Relative::Desired(channel) })
-                .collect::<Vec<_>>()
+            let feature = |(offset, _): &(i32, f64)| Feature {
+                source: Source::Desired,
+                channel,
+                offset: (offset / sub) as i16,
+                relative: Relative::Desired(channel),
+            };
+            window.weights.iter().map(feature).collect::<Vec<_>>()
         };
         self.chosen.iter().zip(self.windows).flat_map(of_axis).collect()
     }
 
     /// The windows as a network that is all skip, and rows of its features.
     fn network(&self, splits: &[Split]) -> (FloatNetwork, Vec<Vec<f32>>) {
-        let envelope = self.envelope();
-        let input_scale: Vec<f32> = envelope.iter().map(|(low, high)| low.abs().max(high.abs()).max(1e-9)).collect();
+        let input_scale: Vec<f32> = self.envelope().iter().map(|(low, high)| low.abs().max(high.abs()).max(1e-9)).collect();
         let output_scale: Vec<f32> = self.windows.iter().map(|window| (window.largest as f32).max(1e-9)).collect();
         let inputs = input_scale.len();
         let mut skip = vec![0.0f32; inputs * self.windows.len()];
-        let mut first = 0;
+        let mut input = 0;
         for (output, window) in self.windows.iter().enumerate() {
-            for (index, (_, weight)) in window.weights.iter().enumerate() {
-                skip[output * inputs + first + index] = (*weight as f32) * input_scale[first + index] / output_scale[output];
+            for (_, weight) in &window.weights {
+                skip[output * inputs + input] = *weight as f32 * input_scale[input] / output_scale[output];
+                input += 1;
             }
-            first += window.weights.len();
         }
         let network = FloatNetwork {
             input_mean: vec![0.0; inputs],
@@ -535,9 +547,9 @@ impl Maker<'_> {
         let shortest = splits.iter().flat_map(|split| &split.training).map(AxisSignals::len).min().unwrap_or(1);
         let rows = (0..shortest).step_by((shortest / ROWS).max(1)).map(|tick| {
             let of_axis = |(split, window): (&Split, &Window)| {
-                let desired = &split.training[0].desired;
-                let last = desired.len() as i32 - 1;
-                let value = |(offset, _): &(i32, f64)| (desired[(tick as i32 + offset).clamp(0, last) as usize] - desired[tick]) as f32;
+                let values = &split.training[0].desired;
+                let last = values.len() as i32 - 1;
+                let value = |(offset, _): &(i32, f64)| (values[(tick as i32 + offset).clamp(0, last) as usize] - values[tick]) as f32;
                 window.weights.iter().map(value).collect::<Vec<_>>()
             };
             splits.iter().zip(self.windows).flat_map(of_axis).collect()

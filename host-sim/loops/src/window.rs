@@ -6,31 +6,26 @@
 //! was logged is regressed on what the window would have done to it through the identified loop (filtered-x, Widrow and Walach
 //! 1996), which needs no stable inverse and is not biased by measurement noise.
 
-use impromptu_diagnosis::least_squares::Regression;
-use impromptu_training::feedback_design::ArxModel;
+use impromptu_diagnosis::{least_squares::Regression, record::decimated};
 
 use crate::{
     reading::{AxisSignals, at},
-    response::response,
+    response::Answer,
 };
 
-/// Offsets of the window of a loop with a time constant of 70 ticks, and that lag.
-const OFFSETS: [i32; 30] = [
-    -60, -50, -42, -36, -30, -25, -20, -16, -12, -8, -4, 4, 8, 12, 16, 20, 24, 28, 32, 36, 40, 44, 48, 52, 56, 60, 65, 70, 76, 84,
-];
-const LAG: f64 = 70.0;
+/// Offsets of the window of a loop with a time constant of 70 ticks, and that time constant.
+const OFFSETS: [i32; 16] = [-44, -32, -22, -14, -8, -4, 4, 8, 14, 20, 27, 35, 44, 54, 66, 80];
+/// See [`OFFSETS`].
+const TIME_CONSTANT: f64 = 70.0;
 
-/// Offsets, ticks, of a loop that lags by so many ticks: whole sub-rate ticks, none of them the present, within the ticks of the
-/// past and the future that the application keeps.
-pub fn offsets(lag_ticks: f64, divisor: i32, [past, future]: [i32; 2]) -> Vec<i32> {
-    let mut offsets: Vec<i32> = OFFSETS
-        .iter()
-        .map(|&offset| {
-            let ticks = f64::from(offset) * lag_ticks / LAG / f64::from(divisor);
-            divisor * (ticks.abs().ceil() as i32) * offset.signum()
-        })
-        .map(|ticks| ticks.clamp(-past / divisor * divisor, future / divisor * divisor))
-        .collect();
+/// Offsets, ticks, of a loop with a time constant of so many ticks: whole multiples of `unit`, none of them the present, within
+/// the ticks of the past and the future that the application keeps.
+pub fn offsets(time_constant: f64, unit: i32, [past, future]: [i32; 2]) -> Vec<i32> {
+    let scaled = |offset: &i32| {
+        let ticks = f64::from(*offset) * time_constant / TIME_CONSTANT / f64::from(unit);
+        (unit * (ticks.abs().ceil() as i32) * offset.signum()).clamp(-past / unit * unit, future / unit * unit)
+    };
+    let mut offsets: Vec<i32> = OFFSETS.iter().map(scaled).collect();
     offsets.dedup();
     offsets
 }
@@ -54,32 +49,32 @@ fn relative(desired: &[f64], offsets: &[i32], tick: usize) -> Vec<f64> {
     offsets.iter().map(|offset| desired[(tick as i32 + offset).clamp(0, last) as usize] - desired[tick]).collect()
 }
 
-/// A signal through a response.
-fn filtered(response: &[f64], values: &[f64]) -> Vec<f64> {
-    (0..values.len())
-        .map(|tick| response.iter().take(tick + 1).enumerate().map(|(lag, weight)| weight * values[tick - lag]).sum())
-        .collect()
-}
-
 /// Sums of a log: columns are the window's and the constant's.
-fn sums(signals: &AxisSignals, offsets: &[i32], response: &[f64], age_ticks: f64) -> Regression {
-    let ticks = signals.len();
-    // The desired position through the response once, as far as the window looks beyond the ends, where it rests.
+fn sums(
+    signals: &AxisSignals,
+    offsets: &[i32],
+    answer: &Answer,
+    age_ticks: f64,
+    skipped: usize,
+) -> Regression {
+    let (ticks, divisor) = (signals.len(), answer.divisor);
+    // The desired position through the loop once, as far as the window looks beyond the ends, where it rests.
     let ends = [offsets.iter().copied().min().unwrap_or(0).min(0), offsets.iter().copied().max().unwrap_or(0).max(0)];
     let held = (ends[0]..ticks as i32 + ends[1]).map(|tick| signals.desired[tick.clamp(0, ticks as i32 - 1) as usize]);
-    let answered = filtered(response, &held.collect::<Vec<_>>());
-    let dither: Vec<f64> = signals.reference.iter().zip(&signals.base).map(|(reference, base)| reference - base).collect();
-    let of_dither = filtered(response, &dither);
-    let gain = response.iter().sum::<f64>();
+    let answered = answer.model.simulate(&decimated(&held.collect::<Vec<_>>(), divisor));
+    let slower = |of: &dyn Fn(usize) -> f64| decimated(&(0..ticks).map(of).collect::<Vec<_>>(), divisor);
+    let of_dither = answer.model.simulate(&slower(&|tick| signals.reference[tick] - signals.base[tick]));
+    let errors = slower(&|tick| signals.measured[tick] - at(&signals.desired, tick as f64 - age_ticks));
     let mut regression = Regression::new(offsets.len() + 1, 1);
-    let mut row = vec![gain; offsets.len() + 1];
-    for tick in response.len()..ticks {
-        let now = (tick as i32 - ends[0]) as usize;
+    let mut row = vec![answer.model.gain(); offsets.len() + 1];
+    let begin = (-ends[0]) as usize / divisor;
+    for (tick, (error, of_dither)) in errors.iter().zip(&of_dither).enumerate().skip(skipped / divisor) {
+        let now = begin + tick;
         for (value, offset) in row.iter_mut().zip(offsets) {
-            *value = answered[(now as i32 + offset) as usize] - answered[now];
+            let there = now as i32 + offset / divisor as i32;
+            *value = answered[(there.max(0) as usize).min(answered.len() - 1)] - answered[now];
         }
-        let error = signals.measured[tick] - at(&signals.desired, tick as f64 - age_ticks) - of_dither[tick];
-        regression.push(&row, &[-error]);
+        regression.push(&row, &[of_dither - error]);
     }
     regression
 }
@@ -88,10 +83,15 @@ fn sums(signals: &AxisSignals, offsets: &[i32], response: &[f64], age_ticks: f64
 const PENALTIES: [f64; 7] = [1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
 
 /// The window that would have left least of the logged errors; which penalty, logs decide that were not fitted.
-pub fn fit(logs: &[&AxisSignals], model: &ArxModel, offsets: &[i32], age_ticks: f64, longest: usize) -> Option<Window> {
-    let response = response(model, longest);
-    let all: Vec<Regression> =
-        logs.iter().filter(|signals| signals.len() > 2 * response.len()).map(|log| sums(log, offsets, &response, age_ticks)).collect();
+pub fn fit(
+    logs: &[&AxisSignals],
+    answer: &Answer,
+    offsets: &[i32],
+    age_ticks: f64,
+    skipped: usize,
+) -> Option<Window> {
+    let long = logs.iter().filter(|signals| signals.len() > 2 * skipped);
+    let all: Vec<Regression> = long.map(|log| sums(log, offsets, answer, age_ticks, skipped)).collect();
     let columns = offsets.len() + 1;
     let joined = |left_out: Option<usize>| {
         let mut joined = Regression::new(columns, 1);
@@ -113,19 +113,23 @@ pub fn fit(logs: &[&AxisSignals], model: &ArxModel, offsets: &[i32], age_ticks: 
     let penalty = PENALTIES.into_iter().min_by(|a, b| missed(*a).total_cmp(&missed(*b)))?;
     let solution = joined(None).solve(penalty)?;
     let (constant, weights) = solution.coefficients.as_slice().split_last()?;
-    let mut envelope = vec![(0.0f64, 0.0f64); offsets.len()];
-    let mut largest = 0.0f64;
+    let mut window = Window {
+        weights: offsets.iter().copied().zip(weights.iter().copied()).collect(),
+        constant: *constant,
+        envelope: vec![(0.0, 0.0); offsets.len()],
+        largest: 0.0,
+    };
     for signals in logs {
         for tick in 0..signals.len() {
             let row = relative(&signals.desired, offsets, tick);
-            let correction: f64 = row.iter().zip(weights).map(|(value, weight)| value * weight).sum();
-            largest = largest.max((correction + constant).abs());
-            for ((low, high), value) in envelope.iter_mut().zip(row) {
-                (*low, *high) = (low.min(value), high.max(value));
+            let correction = |weights: &[f64]| row.iter().zip(weights).map(|(value, weight)| value * weight).sum::<f64>();
+            window.largest = window.largest.max((correction(weights) + constant).abs());
+            for ((low, high), value) in window.envelope.iter_mut().zip(&row) {
+                (*low, *high) = (low.min(*value), high.max(*value));
             }
         }
     }
-    Some(Window { weights: offsets.iter().copied().zip(weights.iter().copied()).collect(), constant: *constant, envelope, largest })
+    Some(window)
 }
 
 #[cfg(test)]
@@ -134,13 +138,13 @@ mod tests {
 
     #[test]
     fn offsets_are_whole_sub_rate_ticks_and_never_the_present() {
-        for (lag, divisor) in [(70.0, 2), (7.0, 1), (1.0, 1), (70.0, 5)] {
-            let found = offsets(lag, divisor, [400, 600]);
-            assert!(found.iter().all(|offset| *offset != 0 && offset % divisor == 0), "{found:?}");
+        for (time_constant, unit) in [(70.0, 2), (7.0, 1), (1.0, 1), (70.0, 5)] {
+            let found = offsets(time_constant, unit, [400, 600]);
+            assert!(found.iter().all(|offset| *offset != 0 && offset % unit == 0), "{found:?}");
             assert!(found.windows(2).all(|pair| pair[0] < pair[1]), "{found:?}");
         }
-        let near = offsets(70.0, 2, [45, 50]);
-        assert_eq!((near[0], *near.last().unwrap()), (-44, 50));
-        assert_eq!(offsets(70.0, 2, [400, 600]).len(), 30);
+        assert_eq!(offsets(70.0, 2, [400, 600]).len(), 16);
+        let near = offsets(70.0, 2, [20, 50]);
+        assert_eq!((near[0], *near.last().unwrap()), (-20, 50));
     }
 }
