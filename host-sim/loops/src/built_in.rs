@@ -36,13 +36,8 @@ pub fn quadrotor(with_tilt: bool) -> (LoopDescription, Layout) {
         cap: None,
         cap_rate: None,
     });
-    let described = LoopDescription {
-        name: QUADROTOR.into(),
-        time: "time_s".into(),
-        rate_hz: None,
-        age_ms: None,
-        axes: axes.collect(),
-    };
+    let described =
+        LoopDescription { name: QUADROTOR.into(), time: "time_s".into(), rate_hz: None, age_ms: None, axes: axes.collect() };
     let channels = (0..3u8).map(|axis| AxisChannels {
         desired: [Some(axis), Some(3 + axis), Some(6 + axis)],
         measured: [Some(axis), Some(3 + axis)],

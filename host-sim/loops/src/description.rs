@@ -221,7 +221,9 @@ impl LoopDescription {
             }
             let velocities = axis.reference_velocity.is_some() && !axis.accepts.velocity();
             if velocities {
-                return value(format!("axes[{index}].reference_velocity: the reference accepts a position only; say accepts = \"position_velocity\""));
+                return value(format!(
+                    "axes[{index}].reference_velocity: the reference accepts a position only; say accepts = \"position_velocity\""
+                ));
             }
         }
         Ok(())

@@ -114,7 +114,9 @@ pub enum NoLane {
     #[error("{0}")]
     Design(#[from] DesignRefusal),
     /// None is good enough.
-    #[error("of {designs} designs none left every piece of the logs better than the loop alone; the best one's worst was {worst:.0} % ({case})")]
+    #[error(
+        "of {designs} designs none left every piece of the logs better than the loop alone; the best one's worst was {worst:.0} % ({case})"
+    )]
     Worse {
         /// Designs.
         designs: usize,
@@ -174,7 +176,13 @@ pub fn authority(layout: &Layout, axes: &[DesignAxis<'_>], rate_hz: f64) -> Auth
     }
 }
 
-fn stored(layout: &Layout, axis: &DesignAxis<'_>, output: u8, designed: &LaneDesign, fast_limit: f64) -> (LaneAxisDescription, Margins) {
+fn stored(
+    layout: &Layout,
+    axis: &DesignAxis<'_>,
+    output: u8,
+    designed: &LaneDesign,
+    fast_limit: f64,
+) -> (LaneAxisDescription, Margins) {
     let channels = &layout.axes[axis.place];
     let coefficients: Vec<f32> = designed.gain.stored_coefficients().iter().map(|value| *value as f32).collect();
     let lags = designed.gain.lags();
@@ -348,7 +356,13 @@ impl Judge<'_> {
     ///
     /// # Errors
     /// If the model is refused.
-    pub fn predicted(&self, axes: &[DesignAxis<'_>], draws: usize, model: &[u8], lanes: Lanes) -> Result<Vec<Vec<[f64; 2]>>, ExportError> {
+    pub fn predicted(
+        &self,
+        axes: &[DesignAxis<'_>],
+        draws: usize,
+        model: &[u8],
+        lanes: Lanes,
+    ) -> Result<Vec<Vec<[f64; 2]>>, ExportError> {
         let benches = self.benches(axes, draws);
         let flown: Vec<Vec<Vec<[f64; 2]>>> = benches
             .par_iter()

@@ -86,13 +86,6 @@ pub enum DraftError {
     Many(usize),
 }
 
-impl DraftError {
-    /// Whether an option settles it.
-    pub fn leaves_open(&self) -> bool {
-        true
-    }
-}
-
 /// What a name says.
 #[derive(Debug, PartialEq, Eq)]
 struct Read {
@@ -117,7 +110,10 @@ fn read(column: &str) -> Read {
     } else if has(ACCELERATION) {
         kind = Kind::Acceleration;
     }
-    let known = |word: &str| ROLES.iter().any(|(_, names)| names.contains(&word)) || [VELOCITY, ACCELERATION, POSITION].iter().any(|names| names.contains(&word));
+    let known = |word: &str| {
+        ROLES.iter().any(|(_, names)| names.contains(&word))
+            || [VELOCITY, ACCELERATION, POSITION].iter().any(|names| names.contains(&word))
+    };
     let mut left: Vec<&str> = words.into_iter().filter(|word| !known(word)).collect();
     // vx and ax beside x.
     if let Some(last) = left.last_mut()
@@ -169,7 +165,8 @@ fn described(axis: &str, columns: &BTreeMap<(Option<Role>, Kind), (String, Optio
     let column = |role, kind| columns.get(&(role, kind)).map(|(column, _)| column.clone());
     // A column without a word for what it is was measured, unless another one says so.
     let measured = |kind| column(Some(Role::Measured), kind).or_else(|| column(None, kind));
-    let (reference, desired) = match (column(Some(Role::Reference), Kind::Position), column(Some(Role::Desired), Kind::Position)) {
+    let (reference, desired) = match (column(Some(Role::Reference), Kind::Position), column(Some(Role::Desired), Kind::Position))
+    {
         (Some(reference), desired) => (reference, desired),
         (None, Some(desired)) => (desired, None),
         (None, None) => return None,
@@ -245,13 +242,10 @@ mod tests {
                 "time_s,desired_x_m,desired_vx_m_s,reference_x_m,reference_vx_m_s,measured_x_m,measured_vx_m_s",
                 vec![("x", "reference_x_m", "measured_x_m", Some("measured_vx_m_s"), Some("desired_x_m"))],
             ),
-            ("time,ctrltarget.x,stateEstimate.x,stateEstimate.vx", vec![(
-                "x",
-                "ctrltarget.x",
-                "stateEstimate.x",
-                Some("stateEstimate.vx"),
-                None,
-            )]),
+            (
+                "time,ctrltarget.x,stateEstimate.x,stateEstimate.vx",
+                vec![("x", "ctrltarget.x", "stateEstimate.x", Some("stateEstimate.vx"), None)],
+            ),
         ] {
             let found = of(header).expect(header);
             let found: Vec<_> = found

@@ -30,7 +30,9 @@ pub struct Layout {
 
 /// A loop of more channels than the format holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the loop has {found} channels of one kind, a model holds {MAX_CHANNELS}: leave velocity or feed-forward of some axes out")]
+#[error(
+    "the loop has {found} channels of one kind, a model holds {MAX_CHANNELS}: leave velocity or feed-forward of some axes out"
+)]
 pub struct TooManyChannels {
     /// Channels.
     pub found: usize,

@@ -13,18 +13,24 @@
 //! | layer | modules | what they hold |
 //! |---|---|---|
 //! | 0 | `description` | a loop in words |
-//! | 1 | `draft`, `layout`, `reading`, `response` | a description from a header; channels of its model; its logs; its answers |
-//! | 2 | `built_in` | loops that need no file |
-//! | 2 | `models`, `replay` | what the logs leave possible; flights on it |
-//! | 3 | `window`, `design` | the network lane; the feedback lane and its choice |
-//! | 4 | `training` | from logs to a model file |
+//! | 1 | `draft`, `layout`, `reading` | a description from a header; channels of its model; its logs |
+//! | 2 | `age`, `built_in`, `response` | how old what is measured is; loops that need no file; answers |
+//! | 3 | `models`, `replay` | what the logs leave possible; flights on it |
+//! | 4 | `window`, `design` | the network lane; the feedback lane and its choice |
+//! | 5 | `prepared` | logs made ready |
+//! | 6 | `complete`, `model` | lane and monitor beside a network lane; what a model says of itself |
+//! | 7 | `training` | from logs to a model file |
 
+pub mod age;
 pub mod built_in;
+pub mod complete;
 pub mod description;
 pub mod design;
 pub mod draft;
 pub mod layout;
+pub mod model;
 pub mod models;
+pub mod prepared;
 pub mod reading;
 pub mod replay;
 pub mod response;

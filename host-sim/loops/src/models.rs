@@ -36,14 +36,46 @@ pub fn axis_log(signals: &AxisSignals) -> AxisLog<'_> {
     }
 }
 
-/// Ratios tried, in time constants of the loop: PD loops of little to much damping.
-const RATIOS: [f64; 8] = [0.5, 0.62, 0.74, 0.86, 0.98, 1.1, 1.25, 1.4];
+/// Ratios tried, in time constants of the loop: none, and those of PD loops of little to much damping.
+const RATIOS: [f64; 9] = [0.0, 0.5, 0.62, 0.74, 0.86, 0.98, 1.1, 1.25, 1.4];
 /// Ticks of logs that are looked at.
 const LOOKED_AT: usize = 30_000;
 
-/// What a velocity reference weighs beside the position reference, s, of a loop that adds them up before anything else: the ratio
-/// at which one combined reference explains most. `None` if none explains anything.
-pub fn ratio_of_references(logs: &[&AxisSignals], settings: &DesignSettings, time_constant_s: f64) -> Option<f64> {
+/// What a velocity reference weighs beside the position reference of each axis, s, of a loop that adds them up before anything
+/// else: the ratio at which one combined reference explains most; 0 where it weighs nothing, which is true of all axes or none.
+pub fn ratios_of_references(axes: &[Vec<&AxisSignals>], rate_hz: f64, time_constants_s: &[f64]) -> Vec<f64> {
+    let curves: Vec<Vec<Option<f64>>> =
+        axes.iter().zip(time_constants_s).map(|(logs, constant)| unexplained(logs, rate_hz, *constant)).collect();
+    // Of all axes together, as a share of what is left without.
+    let sum = |place: usize| -> f64 {
+        curves
+            .iter()
+            .filter_map(|curve| Some((curve.get(place).copied()??, curve.first().copied()??)))
+            .map(|(a, b)| (a / b).ln())
+            .sum()
+    };
+    let helps = (1..RATIOS.len()).any(|place| sum(place) < 0.0);
+    let of_axis = |curve: &Vec<Option<f64>>| {
+        let found: Vec<(f64, f64)> =
+            RATIOS.iter().zip(curve).skip(1).filter_map(|(share, left)| Some((*share, (*left)?))).collect();
+        let best = found.iter().enumerate().min_by(|(_, a), (_, b)| a.1.total_cmp(&b.1)).map(|(index, _)| index)?;
+        match (best.checked_sub(1).and_then(|before| found.get(before)), found.get(best + 1)) {
+            (Some(before), Some(after)) => Some(lowest([*before, found[best], *after])),
+            _ => Some(found[best].0),
+        }
+    };
+    curves
+        .iter()
+        .zip(time_constants_s)
+        .map(|(curve, constant)| if helps { of_axis(curve).unwrap_or(0.0) * constant } else { 0.0 })
+        .collect()
+}
+
+/// What a combined reference leaves unexplained at each of the ratios; nothing of an axis without a velocity reference.
+fn unexplained(logs: &[&AxisSignals], rate_hz: f64, time_constant_s: f64) -> Vec<Option<f64>> {
+    if logs.iter().all(|log| log.reference_velocity.iter().all(|velocity| *velocity == 0.0)) {
+        return Vec::new();
+    }
     let mut ticks = 0;
     let enough = logs.iter().take_while(|log| {
         let before = ticks;
@@ -51,19 +83,14 @@ pub fn ratio_of_references(logs: &[&AxisSignals], settings: &DesignSettings, tim
         before < LOOKED_AT
     });
     let owned: Vec<AxisSignals> = enough.map(|log| (*log).clone()).collect();
-    let of = |share: &f64| {
-        let mut combined = owned.clone();
-        combined.iter_mut().for_each(|signals| signals.combine(share * time_constant_s));
-        let answer = Answer::of(&combined.iter().collect::<Vec<_>>(), 1.0 / settings.tick)?;
-        Some((*share, answer.unexplained))
-    };
-    let found: Vec<(f64, f64)> = RATIOS.par_iter().filter_map(of).collect();
-    let best = found.iter().enumerate().min_by(|(_, a), (_, b)| a.1.total_cmp(&b.1)).map(|(index, _)| index)?;
-    let share = match (best.checked_sub(1).and_then(|before| found.get(before)), found.get(best + 1)) {
-        (Some(before), Some(after)) => lowest([*before, found[best], *after]),
-        _ => found[best].0,
-    };
-    Some(share * time_constant_s)
+    RATIOS
+        .par_iter()
+        .map(|share| {
+            let mut combined = owned.clone();
+            combined.iter_mut().for_each(|signals| signals.combine(share * time_constant_s));
+            Answer::of(&combined.iter().collect::<Vec<_>>(), rate_hz).map(|answer| answer.unexplained)
+        })
+        .collect()
 }
 
 /// Where the parabola through three points is lowest, of which the middle one is.

@@ -48,7 +48,16 @@ impl AxisSignals {
     /// Every `divisor`-th sample, as an application takes them that runs the add-on at a divided rate.
     #[must_use]
     pub fn every(&self, divisor: usize) -> Self {
-        let every = |values: &[f64]| values.iter().step_by(divisor.max(1)).copied().collect::<Vec<f64>>();
+        self.each(|values| values.iter().step_by(divisor.max(1)).copied().collect())
+    }
+
+    /// The samples of a range.
+    #[must_use]
+    pub fn part(&self, range: std::ops::Range<usize>) -> Self {
+        self.each(|values| values[range.clone()].to_vec())
+    }
+
+    fn each(&self, every: impl Fn(&[f64]) -> Vec<f64>) -> Self {
         Self {
             desired: every(&self.desired),
             desired_velocity: every(&self.desired_velocity),
@@ -58,12 +67,15 @@ impl AxisSignals {
             measured: every(&self.measured),
             velocity: every(&self.velocity),
             ratio: self.ratio,
-            fresh: self.fresh.as_deref().map(every),
+            fresh: self.fresh.as_deref().map(&every),
         }
     }
 
     /// Makes one reference of position and velocity, of which the velocity weighs `ratio`, s.
     pub fn combine(&mut self, ratio: f64) {
+        if self.reference_velocity.iter().all(|velocity| *velocity == 0.0) {
+            return;
+        }
         for (index, velocity) in self.reference_velocity.iter_mut().enumerate() {
             self.reference[index] += ratio * *velocity;
             self.base[index] += ratio * *velocity;

@@ -141,7 +141,8 @@ impl<'a> Piece<'a> {
                 // A combined reference takes the velocity's correction with the position's.
                 let apart = if signals.ratio > 0.0 { 0.0 } else { rate };
                 told[axis][tick] = [
-                    signals.base[tick] + delta + signals.ratio * rate + position - older + self.weights[axis] * (velocity - slower),
+                    signals.base[tick] + delta + signals.ratio * rate + position - older
+                        + self.weights[axis] * (velocity - slower),
                     signals.reference_velocity[tick] + apart,
                 ];
                 if scored {
@@ -180,7 +181,10 @@ impl<'m, 'l> Flight<'m, 'l> {
         let channels: Vec<Cap> = (0..layout.signals.reference.len())
             .map(|channel| {
                 let output = card.outputs.iter().find(|output| usize::from(output.channel) == channel);
-                output.map_or(Cap { limit: 1.0, rate: 1.0 }, |output| Cap { limit: output.limit.max(1e-6), rate: (output.slew * rate_hz as f32).max(1e-6) })
+                output.map_or(Cap { limit: 1.0, rate: 1.0 }, |output| Cap {
+                    limit: output.limit.max(1e-6),
+                    rate: (output.slew * rate_hz as f32).max(1e-6),
+                })
             })
             .collect();
         let mut add_on = Box::new(HostAddOn::empty());

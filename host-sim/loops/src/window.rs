@@ -50,13 +50,7 @@ fn relative(desired: &[f64], offsets: &[i32], tick: usize) -> Vec<f64> {
 }
 
 /// Sums of a log: columns are the window's and the constant's.
-fn sums(
-    signals: &AxisSignals,
-    offsets: &[i32],
-    answer: &Answer,
-    age_ticks: f64,
-    skipped: usize,
-) -> Regression {
+fn sums(signals: &AxisSignals, offsets: &[i32], answer: &Answer, age_ticks: f64, skipped: usize) -> Regression {
     let (ticks, divisor) = (signals.len(), answer.divisor);
     // The desired position through the loop once, as far as the window looks beyond the ends, where it rests.
     let ends = [offsets.iter().copied().min().unwrap_or(0).min(0), offsets.iter().copied().max().unwrap_or(0).max(0)];
@@ -83,13 +77,7 @@ fn sums(
 const PENALTIES: [f64; 7] = [1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
 
 /// The window that would have left least of the logged errors; which penalty, logs decide that were not fitted.
-pub fn fit(
-    logs: &[&AxisSignals],
-    answer: &Answer,
-    offsets: &[i32],
-    age_ticks: f64,
-    skipped: usize,
-) -> Option<Window> {
+pub fn fit(logs: &[&AxisSignals], answer: &Answer, offsets: &[i32], age_ticks: f64, skipped: usize) -> Option<Window> {
     let long = logs.iter().filter(|signals| signals.len() > 2 * skipped);
     let all: Vec<Regression> = long.map(|log| sums(log, offsets, answer, age_ticks, skipped)).collect();
     let columns = offsets.len() + 1;
@@ -103,7 +91,8 @@ pub fn fit(
         }
         joined
     };
-    let folds: Vec<Regression> = if all.len() > 1 { (0..all.len()).map(|index| joined(Some(index))).collect() } else { Vec::new() };
+    let folds: Vec<Regression> =
+        if all.len() > 1 { (0..all.len()).map(|index| joined(Some(index))).collect() } else { Vec::new() };
     let missed = |penalty: f64| {
         let errors = folds.iter().zip(&all).map(|(fold, left_out)| {
             fold.solve(penalty).map_or(f64::INFINITY, |solution| left_out.residual(0, &solution.coefficients))

@@ -4,6 +4,7 @@
 
 use clap::{Args, ValueEnum};
 use impromptu_diagnosis::plausibility::{Reading, TimeUnit};
+use impromptu_loops::{age::UnknownAge, draft::DraftError};
 use impromptu_training::{channel::ChannelError, track::TrackError};
 
 use super::Invocation;
@@ -61,6 +62,9 @@ pub(super) fn say<'a>(invocation: &Invocation, file: &str, notes: impl Iterator<
 
 /// Whether the arguments leave open how a log is meant.
 pub(super) fn leaves_open(error: &anyhow::Error) -> bool {
+    if error.downcast_ref::<DraftError>().is_some() || error.downcast_ref::<UnknownAge>().is_some() {
+        return true;
+    }
     let open = |error: &ChannelError| matches!(error, ChannelError::Implausible { source, .. } if source.leaves_open());
     match error.downcast_ref() {
         Some(TrackError::Ambiguous { .. }) => true,

@@ -6,6 +6,7 @@
 mod collect;
 mod configuration;
 mod demo;
+mod describe;
 mod diagnose;
 mod evaluate;
 mod fly;
@@ -54,6 +55,8 @@ Examples:
   host-sim collect --condition lab --flights 20 --out logs
   host-sim collect --condition lab --dither 0.01 --out dithered
   host-sim diagnose --log logs/*.csv
+  host-sim describe --log motor.csv --output motor.toml
+  host-sim train --loop motor.toml --log motor-*.csv --delay-ms 5 --out models
   host-sim learn --log monday.csv tuesday.csv wednesday.csv
   host-sim train --log logs/*.csv --dithered dithered/*.csv --vehicle crazyflie --out models
   host-sim train --learned own.learned --vehicle crazyflie --name flown --out models
@@ -100,6 +103,8 @@ struct Global {
 enum Command {
     /// Flies the baseline and writes flight logs to learn from.
     Collect(collect::Collect),
+    /// Drafts the description of a loop from the header of a log, for `train --loop`.
+    Describe(describe::Describe),
     /// Says of a loop, from its logs or from a test in the simulator, whether an add-on will help, and how much.
     Diagnose(diagnose::Diagnose),
     /// Replays logs of any loop through the learner: predicts what it would have left of each next flight's error.
@@ -127,7 +132,7 @@ impl Command {
             Self::Fly(command) => command.conflict(),
             Self::Evaluate(command) => command.conflict(),
             Self::Study(command) => command.conflict(),
-            Self::Diagnose(_) | Self::Learn(_) | Self::Report(_) | Self::Trajectory(_) => None,
+            Self::Describe(_) | Self::Diagnose(_) | Self::Learn(_) | Self::Report(_) | Self::Trajectory(_) => None,
         }
     }
 }
@@ -210,6 +215,7 @@ fn execute(arguments: Arguments, console: &Console, command: String) -> Result<(
     match arguments.command {
         None => demo::run(&invocation),
         Some(Command::Collect(command)) => command.run(&invocation),
+        Some(Command::Describe(command)) => command.run(&invocation),
         Some(Command::Diagnose(command)) => command.run(&invocation),
         Some(Command::Learn(command)) => command.run(&invocation),
         Some(Command::Train(command)) => command.run(&invocation),

@@ -7,10 +7,10 @@ use impromptu_files::reading;
 use impromptu_loops::{
     LoopDescription, Settings,
     built_in::{QUADROTOR, quadrotor},
+    complete::AxisFit,
     layout::Layout,
     reading::{header, read},
     train,
-    training::AxisFit,
 };
 use impromptu_training::{
     files::{model_files, write_set},
@@ -65,8 +65,15 @@ pub(super) fn run(arguments: &Train, name: &str, invocation: &Invocation) -> Res
     }
     let age_s = arguments.delay_ms.or(described.age_ms).unwrap_or(24.0) / 1e3;
     invocation.console.stage(&format!("training on {} logs", logs.len()));
-    let settings =
-        Settings { age_s, seed, name: arguments.name.clone(), known, axes: arguments.axis.clone(), draws: DRAWS, force: arguments.force };
+    let settings = Settings {
+        age_s,
+        seed,
+        name: arguments.name.clone(),
+        known,
+        axes: arguments.axis.clone(),
+        draws: DRAWS,
+        force: arguments.force,
+    };
     let trained = train(&described, &logs, &settings)?;
     invocation.console.finish();
     for note in &trained.notes {
@@ -89,20 +96,26 @@ pub(super) fn run(arguments: &Train, name: &str, invocation: &Invocation) -> Res
 fn text(summary: &Summary) -> String {
     let mut rows = vec![
         ["model".to_owned(), format!("{}, {} bytes, seed {}", summary.name, summary.bytes, summary.seed)],
-        ["trained on".to_owned(), format!("{:.1} min of flight in {} logs, measurements {:.0} ms old", summary.minutes, summary.logs, summary.age_ms)],
+        [
+            "trained on".to_owned(),
+            format!("{:.1} min of flight in {} logs, measurements {:.0} ms old", summary.minutes, summary.logs, summary.age_ms),
+        ],
     ];
     for fit in &summary.axes {
-        let AxisFit { axis, unit, error, with_network, with_both, reduction_percent: [mean, low, high], lane, .. } = fit;
+        let AxisFit { axis, unit, error, with_network, with_both, reduction_percent: [mean, low, high], lane, refusal, .. } = fit;
         rows.push([
             format!("axis {axis}"),
             format!(
                 "{error:.4} {unit} alone, {with_network:.4} with the network lane, {with_both:.4} with both: {mean:.0} % less ({low:.0} … {high:.0})"
             ),
         ]);
-        rows.push([String::new(), match lane {
-            Ok(design) => format!("feedback lane: {design}"),
-            Err(reason) => format!("no feedback lane: {reason}"),
-        }]);
+        rows.push([
+            String::new(),
+            match lane {
+                Some(design) => format!("feedback lane: {design}"),
+                None => format!("no feedback lane: {}", refusal.as_deref().unwrap_or_default()),
+            },
+        ]);
     }
     rows.extend(summary.files.iter().map(|file| ["file".to_owned(), file.display().to_string()]));
     table(["", "result"], 2, rows)

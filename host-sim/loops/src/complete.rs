@@ -1,0 +1,193 @@
+//! Feedback lane and monitor beside a network lane, whatever that was trained by, and what all of it will do.
+//!
+//! *in* logs that are ready and a way to make model files; *out* lane, monitor, predictions; *never* a lane that the logs kept apart
+//! have not judged; *source* `impromptu-training`, which does this for a simulated vehicle.
+
+use impromptu_firmware::Lanes;
+use impromptu_model_export::{
+    ExportError,
+    description::{LaneDescription, MonitorAxisDescription, MonitorDescription},
+};
+use impromptu_training::feedback_design::response::box_responses;
+use serde::Serialize;
+
+use crate::{
+    description::LoopDescription,
+    design::{Chosen, DesignAxis, Judge, authority, lane_of},
+    layout::Layout,
+    prepared::{Prepared, rms},
+    reading::AxisSignals,
+};
+
+/// Makes a model file with a lane and a monitor.
+pub type Encode<'a> = dyn Fn(Option<&LaneDescription>, Option<&MonitorDescription>) -> Result<Vec<u8>, ExportError> + Sync + 'a;
+
+/// What a lane and a monitor are made for.
+pub struct Request<'a> {
+    /// The loop.
+    pub described: &'a LoopDescription,
+    /// Its signals.
+    pub layout: &'a Layout,
+    /// Its logs.
+    pub prepared: &'a Prepared,
+    /// Age of what is measured, s.
+    pub age_s: f64,
+    /// Time in which a lane fades in, s.
+    pub fade_s: f64,
+    /// Models of which lanes are judged beside the likeliest.
+    pub draws: usize,
+    /// Of each axis the output of its velocity's correction, if the network has one. Positions are the first outputs.
+    pub velocity_outputs: Vec<Option<u8>>,
+    /// Makes a model file.
+    pub encode: &'a Encode<'a>,
+}
+
+/// What was found of an axis.
+#[derive(Clone, Debug, Serialize)]
+pub struct AxisFit {
+    /// Name.
+    pub axis: String,
+    /// Unit.
+    pub unit: String,
+    /// Time in which a step of the position reference has been followed to 63 %, s.
+    pub time_constant_s: f64,
+    /// RMS error of the logs kept apart without the add-on, as measured.
+    pub error: f64,
+    /// The same with the network lane.
+    pub with_network: f64,
+    /// The same with both.
+    pub with_both: f64,
+    /// Reduction by all lanes that there are: mean over logs kept apart, least and greatest of 95 % of them and of the models, %.
+    pub reduction_percent: [f64; 3],
+    /// Design of the feedback lane.
+    pub lane: Option<String>,
+    /// Why there is none.
+    pub refusal: Option<String>,
+}
+
+/// Lane and monitor, and what they will do.
+#[derive(Clone, Debug)]
+pub struct Completed {
+    /// Feedback lane of those axes that have one.
+    pub lane: Option<LaneDescription>,
+    /// Monitor.
+    pub monitor: MonitorDescription,
+    /// Of each axis what was found.
+    pub axes: Vec<AxisFit>,
+}
+
+impl Completed {
+    /// The lanes in words, axis by axis.
+    pub fn words(&self) -> String {
+        let of_axis = |fit: &AxisFit| match (&fit.lane, &fit.refusal) {
+            (Some(design), _) => format!("{}: feedback lane: {design}", fit.axis),
+            (None, reason) => format!("{}: no feedback lane: {}", fit.axis, reason.as_deref().unwrap_or_default()),
+        };
+        self.axes.iter().map(of_axis).collect::<Vec<_>>().join("; ")
+    }
+}
+
+/// What a monitor's response lasts, time constants.
+const MONITORED: f64 = 3.2;
+/// Taps of the monitor.
+const TAPS: usize = 32;
+/// Logs kept apart by which lanes are judged.
+const PIECES: usize = 8;
+
+/// Lane and monitor.
+///
+/// # Errors
+/// If a model cannot be made.
+pub fn complete(request: &Request<'_>) -> Result<Completed, ExportError> {
+    let Request { described, layout, prepared, draws, encode, .. } = request;
+    let axes: Vec<DesignAxis<'_>> = prepared
+        .axes
+        .iter()
+        .map(|axis| DesignAxis { models: &axis.models, scale: axis.scale, settings: axis.design.clone(), place: axis.place })
+        .collect();
+    // Where only some axes are trained, what is judged are these.
+    let judged =
+        Layout { signals: layout.signals.clone(), axes: prepared.axes.iter().map(|axis| layout.axes[axis.place]).collect() };
+    let pieces: Vec<Vec<&AxisSignals>> = {
+        let count = prepared.axes.iter().map(|axis| axis.split.apart.len()).min().unwrap_or(0).min(PIECES);
+        (0..count).map(|index| prepared.axes.iter().map(|axis| &axis.split.apart[index]).collect()).collect()
+    };
+    let count = pieces.len();
+    let judge = Judge {
+        layout: &judged,
+        rate_hz: prepared.model_hz,
+        age_ticks: request.age_s * prepared.model_hz,
+        settled: (request.fade_s * prepared.model_hz).ceil() as usize,
+        pieces,
+        encode: &|lane| encode(lane, None),
+    };
+    let lanes = judge.choose(&axes, *draws)?;
+    let found: Vec<&Chosen> = lanes.iter().filter_map(|lane| lane.as_ref().ok()).collect();
+    let lane = (!found.is_empty()).then(|| {
+        let parts: Vec<_> = found.iter().map(|chosen| (&chosen.lane, chosen.margins)).collect();
+        lane_of(&parts, authority(layout, &axes, prepared.model_hz))
+    });
+    let model = encode(lane.as_ref(), None)?;
+    let both = judge.predicted(&axes, *draws, &model, Lanes::BOTH)?;
+    let network = judge.predicted(&axes, 0, &model, Lanes { network: true, feedback: false })?;
+    let monitor = MonitorDescription { validated_rms: validated_rms(&both, count) as f32, ..monitor(request) };
+    let fits = prepared.axes.iter().zip(lanes).enumerate().map(|(index, (axis, lane))| {
+        let (flights, described) = (&both[index], &described.axes[axis.place]);
+        let (lane, refusal) = match lane {
+            Ok(chosen) => (Some(chosen.design), None),
+            Err(reason) => (None, Some(reason.to_string())),
+        };
+        AxisFit {
+            axis: described.name.clone(),
+            unit: described.unit.clone(),
+            time_constant_s: axis.time_constant_s,
+            error: rms(flights.iter().map(|[baseline, _]| *baseline)),
+            with_network: rms(network[index].iter().map(|[_, with]| *with)),
+            with_both: rms(flights.iter().map(|[_, with]| *with)),
+            reduction_percent: interval(flights),
+            lane,
+            refusal,
+        }
+    });
+    Ok(Completed { axes: fits.collect(), lane, monitor })
+}
+
+/// Mean reduction, and the range of 95 % of the flights.
+fn interval(flights: &[[f64; 2]]) -> [f64; 3] {
+    let mut reductions: Vec<f64> = flights.iter().map(|[baseline, with]| 100.0 * (1.0 - with / baseline.max(1e-12))).collect();
+    reductions.sort_by(f64::total_cmp);
+    let at = |share: f64| reductions.get(((reductions.len() as f64 - 1.0) * share).round() as usize).copied().unwrap_or(0.0);
+    [reductions.iter().sum::<f64>() / reductions.len().max(1) as f64, at(0.025), at(0.975)]
+}
+
+/// Median over the logs kept apart of the RMS error of all axes together, on the likeliest models.
+fn validated_rms(flights: &[Vec<[f64; 2]>], pieces: usize) -> f64 {
+    let of_piece =
+        |index: usize| flights.iter().filter_map(|axis| axis.get(index)).map(|[_, with]| with * with).sum::<f64>().sqrt();
+    let mut all: Vec<f64> = (0..pieces).map(of_piece).collect();
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// The response of each axis to its corrections, without what was validated; errors of one unit only can be added up.
+fn monitor(request: &Request<'_>) -> MonitorDescription {
+    let Request { described, layout, prepared, .. } = request;
+    let ticks = MONITORED * prepared.time_constants_s[1] * prepared.model_hz;
+    let divisor = ((ticks / TAPS as f64).ceil() as usize).max(1);
+    let unit = |place: usize| &described.axes[place].unit;
+    let first = prepared.axes.first().map_or(0, |axis| axis.place);
+    let narrow = |taps: &[f64], factor: f64| taps.iter().map(|tap| (tap * factor) as f32).collect::<Vec<f32>>();
+    let axes =
+        prepared.axes.iter().zip(0u8..).filter(|(axis, _)| unit(axis.place) == unit(first)).filter_map(|(axis, output)| {
+            let [of_position, of_velocity] = box_responses(&axis.models.whole, divisor, TAPS);
+            let channels = &layout.axes[axis.place];
+            let (mut inputs, mut taps) = (vec![output], vec![narrow(&of_position, 1.0)]);
+            if let Some(velocity) = request.velocity_outputs.get(usize::from(output)).copied().flatten() {
+                inputs.push(velocity);
+                // One reference was made of two: what the velocity does is what the position does, times what it weighs.
+                taps.push(if axis.ratio > 0.0 { narrow(&of_position, axis.ratio) } else { narrow(&of_velocity, 1.0) });
+            }
+            Some(MonitorAxisDescription { error: (channels.measured[0]?, channels.desired[0]?), inputs, taps })
+        });
+    MonitorDescription { divisor: divisor as u16, validated_rms: 0.0, axes: axes.collect() }
+}
