@@ -5,10 +5,12 @@
 
 use impromptu_flight::quadrotor;
 use impromptu_model_export::description::Signals;
+use impromptu_sim::flight_log::{FlightLog, LogRow};
 
 use crate::{
     description::{Accepts, AxisDescription, Fresh, FreshKind, LoopDescription},
     layout::{AxisChannels, Layout},
+    reading::{AxisLog, AxisSignals},
 };
 
 /// Name of the quadrotor.
@@ -28,10 +30,7 @@ pub fn quadrotor(with_tilt: bool) -> (LoopDescription, Layout) {
         velocity: Some(format!("measured_v{axis}_m_s")),
         reference_velocity: Some(format!("reference_v{axis}_m_s")),
         desired_velocity: Some(format!("desired_v{axis}_m_s")),
-        fresh: (with_tilt && axis != "z").then(|| Fresh {
-            column: if axis == "x" { "measured_pitch_rad" } else { "measured_roll_rad" }.into(),
-            kind: FreshKind::Acceleration,
-        }),
+        fresh: with_tilt.then(|| Fresh { column: fresh(axis).into(), kind: FreshKind::Acceleration }),
         wrap: None,
         cap: None,
         cap_rate: None,
@@ -44,4 +43,39 @@ pub fn quadrotor(with_tilt: bool) -> (LoopDescription, Layout) {
         reference: [Some(axis), Some(3 + axis), None],
     });
     (described, Layout { signals: Signals::from(&quadrotor::signals()), axes: channels.collect() })
+}
+
+/// Column of a flight log that goes with the acceleration of an axis.
+fn fresh(axis: &str) -> &'static str {
+    match axis {
+        "x" => "measured_pitch_rad",
+        "y" => "measured_roll_rad",
+        _ => "measured_az_m_s2",
+    }
+}
+
+/// Of each axis what of the body's channels goes with its acceleration: pitch, roll, the vertical acceleration.
+const FRESH: [usize; 3] = [1, 0, 6];
+
+/// A flight log axis by axis.
+pub fn axis_logs(log: &FlightLog) -> Vec<AxisLog> {
+    let column = |of: &dyn Fn(&LogRow) -> f64| log.rows.iter().map(of).collect::<Vec<f64>>();
+    let of_axis = |axis: usize| {
+        let desired = column(&|row| row.desired.position[axis]);
+        let told = log.rows.iter().all(|row| row.measured_body.is_some());
+        AxisSignals {
+            base: desired.clone(),
+            desired,
+            desired_velocity: column(&|row| row.desired.velocity[axis]),
+            reference: column(&|row| row.reference_position[axis]),
+            reference_velocity: column(&|row| row.reference_velocity[axis]),
+            measured: column(&|row| row.measured_position[axis]),
+            velocity: column(&|row| row.measured_velocity[axis]),
+            ratio: 0.0,
+            fresh: told.then(|| column(&|row| row.measured_body.map_or(0.0, |body| body[FRESH[axis]]))),
+        }
+    };
+    (0..3)
+        .map(|axis| AxisLog { file: log.name.clone(), rate_hz: log.rate_hz, signals: of_axis(axis), notes: Vec::new() })
+        .collect()
 }

@@ -3,7 +3,7 @@
 //! *in* logs that are ready and a way to make model files; *out* lane, monitor, predictions; *never* a lane that the logs kept apart
 //! have not judged; *source* `impromptu-training`, which does this for a simulated vehicle.
 
-use impromptu_firmware::Lanes;
+use impromptu_firmware::{Lanes, model::MAX_AXES};
 use impromptu_model_export::{
     ExportError,
     description::{LaneDescription, MonitorAxisDescription, MonitorDescription},
@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use crate::{
     description::LoopDescription,
-    design::{Chosen, DesignAxis, Judge, authority, lane_of},
+    design::{Chosen, DesignAxis, Judge, NoLane, authority, lane_of},
     layout::Layout,
     prepared::{Prepared, rms},
     reading::AxisSignals,
@@ -70,8 +70,8 @@ pub struct AxisFit {
 pub struct Completed {
     /// Feedback lane of those axes that have one.
     pub lane: Option<LaneDescription>,
-    /// Monitor.
-    pub monitor: MonitorDescription,
+    /// Monitor of those axes whose logs show what a correction does.
+    pub monitor: Option<MonitorDescription>,
     /// Of each axis what was found.
     pub axes: Vec<AxisFit>,
 }
@@ -103,7 +103,8 @@ pub fn complete(request: &Request<'_>) -> Result<Completed, ExportError> {
     let axes: Vec<DesignAxis<'_>> = prepared
         .axes
         .iter()
-        .map(|axis| DesignAxis { models: &axis.models, scale: axis.scale, settings: axis.design.clone(), place: axis.place })
+        .enumerate()
+        .map(|(place, axis)| DesignAxis { models: &axis.models, scale: axis.scale, settings: axis.design.clone(), place })
         .collect();
     // Where only some axes are trained, what is judged are these.
     let judged =
@@ -121,16 +122,17 @@ pub fn complete(request: &Request<'_>) -> Result<Completed, ExportError> {
         pieces,
         encode: &|lane| encode(lane, None),
     };
-    let lanes = judge.choose(&axes, *draws)?;
+    let mut lanes = judge.choose(&axes, *draws)?;
+    only_the_best(&mut lanes);
     let found: Vec<&Chosen> = lanes.iter().filter_map(|lane| lane.as_ref().ok()).collect();
     let lane = (!found.is_empty()).then(|| {
         let parts: Vec<_> = found.iter().map(|chosen| (&chosen.lane, chosen.margins)).collect();
-        lane_of(&parts, authority(layout, &axes, prepared.model_hz))
+        lane_of(&parts, authority(&judged, &axes, prepared.model_hz))
     });
     let model = encode(lane.as_ref(), None)?;
     let both = judge.predicted(&axes, *draws, &model, Lanes::BOTH)?;
     let network = judge.predicted(&axes, 0, &model, Lanes { network: true, feedback: false })?;
-    let monitor = MonitorDescription { validated_rms: validated_rms(&both, count) as f32, ..monitor(request) };
+    let monitor = monitor(request, validated_rms(&both, count) as f32);
     let fits = prepared.axes.iter().zip(lanes).enumerate().map(|(index, (axis, lane))| {
         let (flights, described) = (&both[index], &described.axes[axis.place]);
         let (lane, refusal) = match lane {
@@ -152,6 +154,21 @@ pub fn complete(request: &Request<'_>) -> Result<Completed, ExportError> {
     Ok(Completed { axes: fits.collect(), lane, monitor })
 }
 
+/// A model holds so many lanes: those that help most stay.
+fn only_the_best(lanes: &mut [Result<Chosen, NoLane>]) {
+    let mut scores: Vec<f64> = lanes.iter().filter_map(|lane| lane.as_ref().ok()).map(|lane| lane.score).collect();
+    scores.sort_by(|a, b| b.total_cmp(a));
+    let Some(&least) = scores.get(MAX_AXES.saturating_sub(1)) else { return };
+    let mut left = MAX_AXES;
+    for lane in lanes {
+        let stays = lane.as_ref().is_ok_and(|lane| lane.score >= least) && left > 0;
+        left -= usize::from(stays);
+        if lane.is_ok() && !stays {
+            *lane = Err(NoLane::Full);
+        }
+    }
+}
+
 /// Mean reduction, and the range of 95 % of the flights.
 fn interval(flights: &[[f64; 2]]) -> [f64; 3] {
     let mut reductions: Vec<f64> = flights.iter().map(|[baseline, with]| 100.0 * (1.0 - with / baseline.max(1e-12))).collect();
@@ -169,8 +186,8 @@ fn validated_rms(flights: &[Vec<[f64; 2]>], pieces: usize) -> f64 {
     all.get(all.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// The response of each axis to its corrections, without what was validated; errors of one unit only can be added up.
-fn monitor(request: &Request<'_>) -> MonitorDescription {
+/// The response to its corrections of each axis whose logs show it; errors of one unit only can be added up.
+fn monitor(request: &Request<'_>, validated_rms: f32) -> Option<MonitorDescription> {
     let Request { described, layout, prepared, .. } = request;
     let ticks = MONITORED * prepared.time_constants_s[1] * prepared.model_hz;
     let divisor = ((ticks / TAPS as f64).ceil() as usize).max(1);
@@ -179,6 +196,7 @@ fn monitor(request: &Request<'_>) -> MonitorDescription {
     let narrow = |taps: &[f64], factor: f64| taps.iter().map(|tap| (tap * factor) as f32).collect::<Vec<f32>>();
     let axes =
         prepared.axes.iter().zip(0u8..).filter(|(axis, _)| unit(axis.place) == unit(first)).filter_map(|(axis, output)| {
+            axis.models.data.excitation().require(axis.design.least_excitation).ok()?;
             let [of_position, of_velocity] = box_responses(&axis.models.whole, divisor, TAPS);
             let channels = &layout.axes[axis.place];
             let (mut inputs, mut taps) = (vec![output], vec![narrow(&of_position, 1.0)]);
@@ -189,5 +207,6 @@ fn monitor(request: &Request<'_>) -> MonitorDescription {
             }
             Some(MonitorAxisDescription { error: (channels.measured[0]?, channels.desired[0]?), inputs, taps })
         });
-    MonitorDescription { divisor: divisor as u16, validated_rms: 0.0, axes: axes.collect() }
+    let axes: Vec<MonitorAxisDescription> = axes.take(MAX_AXES).collect();
+    (!axes.is_empty()).then(|| MonitorDescription { divisor: divisor as u16, validated_rms, axes })
 }

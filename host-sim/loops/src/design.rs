@@ -7,7 +7,7 @@
 
 use impromptu_firmware::{
     Lanes,
-    model::{Margins, Model},
+    model::{MAX_AXES, Margins, Model},
 };
 use impromptu_model_export::{
     ExportError,
@@ -113,6 +113,9 @@ pub enum NoLane {
     /// No design exists.
     #[error("{0}")]
     Design(#[from] DesignRefusal),
+    /// Other axes gain more.
+    #[error("a model holds {MAX_AXES} lanes, and other axes gain more by theirs")]
+    Full,
     /// None is good enough.
     #[error(
         "of {designs} designs none left every piece of the logs better than the loop alone; the best one's worst was {worst:.0} % ({case})"

@@ -16,6 +16,7 @@
 //! | 1 | `draft`, `layout`, `reading` | a description from a header; channels of its model; its logs |
 //! | 2 | `age`, `built_in`, `response` | how old what is measured is; loops that need no file; answers |
 //! | 3 | `models`, `replay` | what the logs leave possible; flights on it |
+//! | 4 | `machines` | loops to try it on |
 //! | 4 | `window`, `design` | the network lane; the feedback lane and its choice |
 //! | 5 | `prepared` | logs made ready |
 //! | 6 | `complete`, `model` | lane and monitor beside a network lane; what a model says of itself |
@@ -28,6 +29,7 @@ pub mod description;
 pub mod design;
 pub mod draft;
 pub mod layout;
+pub mod machines;
 pub mod model;
 pub mod models;
 pub mod prepared;

@@ -162,6 +162,24 @@ fn pairs(signals: &AxisSignals) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
     (both(&signals.reference, &signals.reference_velocity), both(&signals.measured, &signals.velocity))
 }
 
+/// The add-on with a model, for an application that lets corrections be as large as the model's limits.
+///
+/// # Errors
+/// If the model runs at another rate, or looks further than the preview keeps.
+pub fn host_add_on<'m>(model: &'m Model<'m>, rate_hz: f64, lanes: Lanes) -> Result<Box<HostAddOn<'m>>, Refusal> {
+    let card = model.card();
+    let cap = |channel: usize| {
+        let output = card.outputs.iter().find(|output| usize::from(output.channel) == channel);
+        let [limit, rate] = output.map_or([1.0; 2], |output| [output.limit, output.slew * rate_hz as f32]);
+        Cap { limit: limit.max(1e-6), rate: rate.max(1e-6) }
+    };
+    let channels: Vec<Cap> = (0..card.signals.reference.len()).map(cap).collect();
+    let mut add_on = Box::new(HostAddOn::empty());
+    add_on.load(model, &card.signals, rate_hz as f32, &Caps { channels: &channels, sums: &[] })?;
+    add_on.switch(lanes);
+    Ok(add_on)
+}
+
 /// A model in the firmware's add-on.
 pub struct Flight<'m, 'l> {
     add_on: Box<HostAddOn<'m>>,
@@ -177,23 +195,11 @@ impl<'m, 'l> Flight<'m, 'l> {
     /// # Errors
     /// If the model is for another loop.
     pub fn new(model: &'m Model<'m>, layout: &'l Layout, rate_hz: f64, lanes: Lanes, guarded: bool) -> Result<Self, Refusal> {
-        let card = model.card();
-        let channels: Vec<Cap> = (0..layout.signals.reference.len())
-            .map(|channel| {
-                let output = card.outputs.iter().find(|output| usize::from(output.channel) == channel);
-                output.map_or(Cap { limit: 1.0, rate: 1.0 }, |output| Cap {
-                    limit: output.limit.max(1e-6),
-                    rate: (output.slew * rate_hz as f32).max(1e-6),
-                })
-            })
-            .collect();
-        let mut add_on = Box::new(HostAddOn::empty());
-        add_on.load(model, &card.signals, rate_hz as f32, &Caps { channels: &channels, sums: &[] })?;
+        let mut add_on = host_add_on(model, rate_hz, lanes)?;
         if !guarded {
             add_on.set_guard(GuardSettings::OFF);
         }
-        add_on.switch(lanes);
-        let ahead = card.preview_span().1 as i32;
+        let ahead = model.card().preview_span().1 as i32;
         Ok(Self { add_on, scratch: Box::new(Scratch::new()), layout, rate_hz, ahead })
     }
 

@@ -153,7 +153,7 @@ pub fn train(described: &LoopDescription, logs: &[Vec<AxisLog>], settings: &Sett
     })?;
     let Prepared { divisor, minutes, model_hz, .. } = ready;
     let remarks = format!("{minutes:.1} min of logs; {}", completed.words());
-    let description = maker.description(completed.lane.as_ref(), Some(completed.monitor), &remarks);
+    let description = maker.description(completed.lane.as_ref(), completed.monitor, &remarks);
     let model = file(&description)?;
     if divisor > 1 {
         notes.push(format!(

@@ -6,7 +6,8 @@
 //! Columns, in SI units and the world frame ENU: `time_s`; `desired_{x,y,z}_m`, `desired_{vx,vy,vz}_m_s`,
 //! `desired_{ax,ay,az}_m_s2` (optional), `desired_yaw_rad` (optional); `reference_{x,y,z}_m`, `reference_{vx,vy,vz}_m_s` (what
 //! the loop received); `measured_{x,y,z}_m`, `measured_{vx,vy,vz}_m_s` (as the loop received it, so as late as that);
-//! `true_{x,y,z}_m` (optional, simulators only). Further columns are ignored.
+//! `measured_{roll,pitch,yaw}_rad`, `measured_{wx,wy,wz}_rad_s`, `measured_az_m_s2` (optional: attitude, body rates, vertical
+//! acceleration, fresher than the position); `true_{x,y,z}_m` (optional, simulators only). Further columns are ignored.
 
 use std::{io, ops::Range, path::Path};
 
@@ -19,6 +20,17 @@ use crate::{
 
 /// Measured channels behind position and velocity.
 pub const BODY: usize = MEASURED - 6;
+
+/// Columns of these.
+const BODY_COLUMNS: [&str; BODY] = [
+    "measured_roll_rad",
+    "measured_pitch_rad",
+    "measured_yaw_rad",
+    "measured_wx_rad_s",
+    "measured_wy_rad_s",
+    "measured_wz_rad_s",
+    "measured_az_m_s2",
+];
 
 /// One reference tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -36,7 +48,7 @@ pub struct LogRow {
     /// Velocity as the loop was told, m/s.
     pub measured_velocity: [f64; 3],
     /// Roll, pitch, yaw (rad), body rates (rad/s) and vertical acceleration (m/s²) as the add-on was told, where the log has
-    /// them: CSV has not.
+    /// them.
     pub measured_body: Option<[f64; BODY]>,
     /// True position, m, where somebody knows it.
     pub true_position: Option<[f64; 3]>,
@@ -126,6 +138,10 @@ impl FlightLog {
             header.extend(names(signal, derivative, unit));
         }
         header.push("desired_yaw_rad".into());
+        let with_body = self.rows.iter().all(|row| row.measured_body.is_some());
+        if with_body {
+            header.extend(BODY_COLUMNS.map(str::to_owned));
+        }
         let with_truth = self.rows.iter().all(|row| row.true_position.is_some());
         if with_truth {
             header.extend(names("true", "", "m"));
@@ -142,10 +158,12 @@ impl FlightLog {
                 row.measured_position,
                 row.measured_velocity,
             ];
+            let body = row.measured_body.filter(|_| with_body);
             let truth = row.true_position.filter(|_| with_truth);
             let cells = std::iter::once(row.time)
                 .chain(vectors.into_iter().flatten())
                 .chain([desired.yaw])
+                .chain(body.into_iter().flatten())
                 .chain(truth.into_iter().flatten());
             writer.write_record(cells.map(|value| value.to_string())).map_err(in_csv)?;
         }
@@ -190,6 +208,8 @@ impl FlightLog {
         ];
         let (acceleration, yaw, truth) =
             (optional("desired", "a", "m_s2"), table.find("desired_yaw_rad"), optional("true", "", "m"));
+        let body = BODY_COLUMNS.map(|column| table.find(column));
+        let body = body.iter().all(Option::is_some).then(|| body.map(Option::unwrap_or_default));
         let mut rows: Vec<LogRow> = Vec::new();
         for row in table.rows() {
             let cells = row?;
@@ -207,7 +227,7 @@ impl FlightLog {
                 reference_velocity: cells.numbers_within(reference_velocity, FASTEST)?,
                 measured_position: cells.numbers_within(measured_position, FARTHEST)?,
                 measured_velocity: cells.numbers_within(measured_velocity, FASTEST)?,
-                measured_body: None,
+                measured_body: body.map(|places| cells.numbers_within(places, FASTEST)).transpose()?,
                 true_position: truth.map(|places| cells.numbers_within(places, FARTHEST)).transpose()?,
             };
             if let Some(previous) = rows.last() {

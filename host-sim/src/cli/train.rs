@@ -8,7 +8,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, anyhow, bail};
 use clap::Args;
 use impromptu_files::name::plain;
+use impromptu_firmware::learning::Kept;
 use impromptu_flight::flight::Rates;
+use impromptu_loops::complete::AxisFit;
 use impromptu_sim::{controller::Controller, flight_log::FlightLog, flights::Loop};
 use impromptu_training::{
     AxisGates, LearnError, LearnSettings, Learned, Pipeline, Purpose, Recipe, Trained, Validation, check_gates, derived,
@@ -101,6 +103,10 @@ struct Summary {
     gates: Vec<AxisGates>,
     /// What --force overrode, or `null`.
     overridden: Option<String>,
+    /// Flight that was learned from, minutes.
+    minutes: f64,
+    /// Of each axis what its lanes will do, where the feedback lane was chosen on the logs.
+    axes: Vec<AxisFit>,
     files: Vec<PathBuf>,
 }
 
@@ -116,6 +122,10 @@ struct Made {
     trained: Trained,
     gates: Vec<AxisGates>,
     overridden: Option<String>,
+    /// Of each axis what its lane will do, where it was chosen on the logs.
+    fits: Vec<AxisFit>,
+    /// Flight that was learned from, minutes.
+    minutes: f64,
 }
 
 fn read(paths: &[PathBuf], rate_hz: f64) -> Result<Vec<FlightLog>> {
@@ -146,9 +156,9 @@ impl Train {
         invocation.console.note(&format!("seed {seed}"));
         let folder = invocation.configuration.folder()?;
         self.check_outputs(invocation, &folder)?;
-        let Made { learned, trained, gates, overridden } = match &self.learned {
+        let Made { learned, trained, gates, overridden, fits, minutes } = match &self.learned {
             Some(path) => self.of_flight(path, invocation, &recipe, &origin, seed)?,
-            None => self.of_logs(invocation, &recipe, &origin, seed)?,
+            None => self.of_logs(invocation, &recipe, origin, seed)?,
         };
         let Trained { lane, description, model } = trained;
         invocation.console.note(&in_words(&lane));
@@ -167,16 +177,21 @@ impl Train {
             refusal,
             gates,
             overridden,
+            minutes,
+            axes: fits,
             files,
         };
         invocation.format.print(&trained, || text(&trained))
     }
 
     /// From logs, which pass the gates first.
-    fn of_logs(&self, invocation: &Invocation, recipe: &Recipe, origin: &Origin, seed: u64) -> Result<Made> {
+    fn of_logs(&self, invocation: &Invocation, recipe: &Recipe, mut origin: Origin, seed: u64) -> Result<Made> {
         let rate_hz = f64::from(Rates::default().reference_hz());
         let (logs, dithered) = (read(&self.log, rate_hz)?, read(&self.dithered, rate_hz)?);
         check_movement(&logs)?;
+        if self.vehicle.is_none() && self.delay_ms.is_none() {
+            origin.delay_s = any_loop::age_of_flights(&logs, invocation);
+        }
         let gates = self.pass_gates(invocation, &logs, origin.delay_s, seed)?;
         invocation.console.stage(&format!("training on {} logs", logs.len()));
         let pipeline = origin.pipeline(recipe, seed, self.force)?;
@@ -192,8 +207,12 @@ impl Train {
         invocation.console.stage("designing the feedback lane");
         let overridden = self.overridden(invocation, recipe, &learned, gates.overridden, rate_hz);
         let identification = if dithered.is_empty() { &logs } else { &dithered };
-        let trained = pipeline.complete(&learned, identification, &self.name, overridden.as_deref())?;
-        Ok(Made { learned, trained, gates: gates.axes, overridden })
+        let (trained, fits) = match origin.closed_loop {
+            Some(_) => (pipeline.complete(&learned, identification, &self.name, overridden.as_deref())?, Vec::new()),
+            None => any_loop::beside(&pipeline, &learned, identification, &self.name, overridden.as_deref())?,
+        };
+        let minutes = logs.iter().chain(&dithered).map(|log| log.rows.len() as f64 / log.rate_hz).sum::<f64>() / 60.0;
+        Ok(Made { learned, trained, gates: gates.axes, overridden, fits, minutes })
     }
 
     /// From what was learned in flight, beside the simulated loop.
@@ -210,7 +229,10 @@ impl Train {
         };
         let remark = "network: the preview part of what was learned in flight";
         let trained = origin.pipeline(&recipe, seed, false)?.complete(&learned, &dithered, &self.name, Some(remark))?;
-        Ok(Made { learned, trained, gates: Vec::new(), overridden: None })
+        let learned_s = |kept: Kept<'_>| kept.axes().fold(0.0f32, |most, axis| most.max(axis.learned_s));
+        let seconds = Kept::read(&kept).map_or(0.0, learned_s);
+        let minutes = f64::from(seconds) / 60.0;
+        Ok(Made { learned, trained, gates: Vec::new(), overridden: None, fits: Vec::new(), minutes })
     }
 
     /// Why the arguments do not go together, if they do not.
@@ -342,13 +364,14 @@ fn text(trained: &Summary) -> String {
     };
     let source = match trained.logs {
         0 => "what was learned in flight".to_owned(),
-        logs => format!("{} rows of {logs} logs", trained.rows),
+        logs => format!("{:.1} min of flight: {} rows of {logs} logs", trained.minutes, trained.rows),
     };
     let mut rows = vec![
         ["model".to_owned(), format!("{}, {} bytes, seed {}", trained.name, trained.bytes, trained.seed)],
         ["trained on".to_owned(), source],
         ["feedback lane".to_owned(), lane],
     ];
+    rows.extend(trained.axes.iter().flat_map(any_loop::fit_rows));
     rows.extend(trained.files.iter().map(|file| ["file".to_owned(), file.display().to_string()]));
     table(["", "result"], 2, rows)
 }

@@ -32,6 +32,9 @@ pub enum LaneRefusal {
     /// Nothing flies that could judge the designs.
     #[error("it is chosen by simulated flights, and no vehicle was given; give --vehicle")]
     NoFlights,
+    /// The logs allow none.
+    #[error("{0}")]
+    Logs(String),
     /// Flights could not be flown.
     #[error(transparent)]
     Rollout(#[from] FlightsError),

@@ -23,6 +23,9 @@ A log is a CSV file with a header; SI units, world frame ENU (x east, y north, z
   measured_x_m, measured_y_m, measured_z_m      position as the loop was told, as late as it was told, m
   measured_vx_m_s, measured_vy_m_s, measured_vz_m_s
                                                 velocity as the loop was told, m/s
+  measured_roll_rad, measured_pitch_rad, measured_yaw_rad, measured_wx_rad_s, measured_wy_rad_s, measured_wz_rad_s, measured_az_m_s2
+                                                attitude, body rates and vertical acceleration as the loop was told, which
+                                                are fresher than the position: its age is found from them (may be absent)
   true_x_m, true_y_m, true_z_m                  true position, m (simulators only, may be absent)
 Further columns are ignored.
 
