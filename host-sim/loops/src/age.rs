@@ -3,11 +3,12 @@
 //! *in* logs of an axis with a column that the position follows from: its velocity or its acceleration, but for a factor and a
 //! constant; *out* an age with its standard error, or that none can be told; *never* an age from reference and position alone: a
 //! loop that is later and one that is told later look the same; *source* ours: both signals go through the same band-pass, one of
-//! them integrated on the way, and are laid over each other at the shift that leaves least.
+//! them integrated on the way, and are laid over each other at the shift that leaves least, beside the position's own integral:
+//! drag or friction, which else would look like a shift.
 //!
 //! The band lies where the loop's own motions are: the constant, and what drifts in an integral, is below it; noise above.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
 use crate::{
     description::FreshKind,
@@ -26,8 +27,8 @@ pub struct Age {
 /// Why the age of what is measured must be told.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the age of what is measured cannot be told from reference and position alone ({why}): say it with --delay-ms or age_ms in the \
-     description, or log a fresher signal (`fresh`: attitude, acceleration, motor current). {cost}"
+    "the age of what is measured cannot be told from reference and position alone ({why}): say it with --delay-ms or age_ms in \
+     the description, or log a fresher signal (`fresh`: attitude, acceleration, motor current). {cost}"
 )]
 pub struct UnknownAge {
     /// Why no fresher signal told it.
@@ -38,6 +39,8 @@ pub struct UnknownAge {
 
 /// Oldest measurement that is looked for, and steps in which, s.
 const OLDEST_S: f64 = 0.15;
+/// Ticks by which a fresher signal may come later than the position.
+const BEFORE: f64 = 4.0;
 /// A stretch of a log, s, times the loop's time constant, that gives an estimate of its own.
 const STRETCH: f64 = 20.0;
 /// Largest standard error with which an age is told, s.
@@ -87,36 +90,49 @@ fn band(mut values: Vec<f64>, integrals: usize, [low_hz, high_hz]: [f64; 2], rat
     low(&low(&values, high_hz, rate_hz), high_hz, rate_hz)
 }
 
-/// What a shift leaves of the position, and what there was.
-fn left(position: &[f64], follows: &[f64], range: std::ops::Range<usize>, shift: f64) -> (f64, f64) {
-    let (mut both, mut of_follows, mut of_position) = (0.0, 0.0, 0.0);
-    for tick in range {
-        let (y, x) = (position[tick], at(follows, tick as f64 - shift));
-        both += x * y;
-        of_follows += x * x;
-        of_position += y * y;
-    }
-    (of_position - both * both / of_follows.max(f64::MIN_POSITIVE), of_position)
+/// A stretch of both signals, and of the position's own integral.
+struct Stretch<'a> {
+    position: &'a [f64],
+    follows: &'a [f64],
+    drag: &'a [f64],
+    range: std::ops::Range<usize>,
 }
 
-/// The shift, ticks, at which `follows` explains most of the position in a stretch, if it explains enough.
-fn shift(position: &[f64], follows: &[f64], range: std::ops::Range<usize>, most: f64) -> Option<f64> {
-    let steps = (4.0 * most).ceil() as usize;
-    let of = |step: usize| {
-        let shift = (step as f64 / steps as f64) * (most + 4.0) - 4.0;
-        (shift, left(position, follows, range.clone(), shift).0)
-    };
-    let all: Vec<(f64, f64)> = (0..=steps).map(of).collect();
-    let best = (0..all.len()).min_by(|a, b| all[*a].1.total_cmp(&all[*b].1))?;
-    let power = left(position, follows, range, 0.0).1;
-    if best == 0 || best + 1 == all.len() || all[best].1 > (1.0 - LEAST_EXPLAINED) * power {
-        return None;
+impl Stretch<'_> {
+    /// What a shift, ticks, leaves of the position, with what drag or friction takes from it.
+    fn left(&self, shift: f64) -> f64 {
+        let (mut gram, mut cross, mut power) = (Matrix2::zeros(), Vector2::zeros(), 0.0);
+        for tick in self.range.clone() {
+            let row = Vector2::new(at(self.follows, tick as f64 - shift), self.drag[tick]);
+            gram += row * row.transpose();
+            cross += row * self.position[tick];
+            power += self.position[tick] * self.position[tick];
+        }
+        match gram.lu().solve(&cross) {
+            Some(weights) => power - weights.dot(&cross),
+            None => power,
+        }
     }
-    // A parabola through the least and its neighbours.
-    let points = [all[best - 1], all[best], all[best + 1]];
-    let matrix = Matrix3::from_fn(|row, column| (points[row].0 - points[1].0).powi(column as i32));
-    let [_, slope, curve]: [f64; 3] = matrix.lu().solve(&Vector3::from_fn(|row, _| points[row].1))?.into();
-    Some(points[1].0 - 0.5 * slope / curve)
+
+    /// The shift, ticks, at which the fresher signal explains most of the position, if it explains enough; `most` is the largest.
+    fn shift(&self, most: f64) -> Option<f64> {
+        let steps = (4.0 * most).ceil() as usize;
+        let of = |step: usize| {
+            let shift = (step as f64 / steps as f64) * (most + BEFORE) - BEFORE;
+            (shift, self.left(shift))
+        };
+        let all: Vec<(f64, f64)> = (0..=steps).map(of).collect();
+        let best = (0..all.len()).min_by(|a, b| all[*a].1.total_cmp(&all[*b].1))?;
+        let without = self.range.clone().map(|tick| self.position[tick] * self.position[tick]).sum::<f64>();
+        if best == 0 || best + 1 == all.len() || all[best].1 > (1.0 - LEAST_EXPLAINED) * without {
+            return None;
+        }
+        // A parabola through the least and its neighbours.
+        let points = [all[best - 1], all[best], all[best + 1]];
+        let matrix = Matrix3::from_fn(|row, column| (points[row].0 - points[1].0).powi(column as i32));
+        let [_, slope, curve]: [f64; 3] = matrix.lu().solve(&Vector3::from_fn(|row, _| points[row].1))?.into();
+        Some(points[1].0 - 0.5 * slope / curve)
+    }
 }
 
 /// The age from logs of an axis at this rate, of a loop with this time constant. `None` if the fresher signal does not tell.
@@ -131,12 +147,17 @@ pub fn estimated(logs: &[(&AxisSignals, FreshKind)], rate_hz: f64, time_constant
         };
         let position = band(signals.measured.clone(), 0, band_hz, rate_hz);
         let follows = band(fresh.clone(), integrals, band_hz, rate_hz);
+        let drag = match kind {
+            FreshKind::Velocity => vec![0.0; position.len()],
+            FreshKind::Acceleration => band(signals.measured.clone(), 1, band_hz, rate_hz),
+        };
         let settled = (1.5 * rate_hz / band_hz[0] / std::f64::consts::TAU * 2.0) as usize;
-        let stretch = ((STRETCH * time_constant_s * rate_hz) as usize).max(200);
+        let length = ((STRETCH * time_constant_s * rate_hz) as usize).max(200);
         let mut from = settled;
-        while from + stretch / 2 < signals.len() {
-            let to = (from + stretch).min(signals.len());
-            shifts.extend(shift(&position, &follows, from..to, OLDEST_S * rate_hz));
+        while from + length / 2 < signals.len() {
+            let to = (from + length).min(signals.len());
+            let stretch = Stretch { position: &position, follows: &follows, drag: &drag, range: from..to };
+            shifts.extend(stretch.shift(OLDEST_S * rate_hz));
             from = to;
         }
     }
@@ -151,6 +172,15 @@ pub fn estimated(logs: &[(&AxisSignals, FreshKind)], rate_hz: f64, time_constant
     let error = 1.85 * deviations[deviations.len() / 2] / (shifts.len() as f64).sqrt();
     let age = Age { seconds: (middle / rate_hz).max(0.0), error_s: error / rate_hz };
     (age.error_s <= SURE_S).then_some(age)
+}
+
+/// Ages that several axes tell, as one: each counts by how sure it is.
+pub fn pooled(ages: &[Age]) -> Option<Age> {
+    // None is surer than a twentieth of the least that is believed.
+    let weight = |age: &Age| 1.0 / age.error_s.max(SURE_S / 20.0).powi(2);
+    let sum: f64 = ages.iter().map(weight).sum();
+    let seconds = ages.iter().map(|age| weight(age) * age.seconds).sum::<f64>() / sum;
+    (!ages.is_empty()).then_some(Age { seconds, error_s: sum.sqrt().recip() })
 }
 
 /// What a wrong age costs, in words: what moves is as far off as it goes in that time.

@@ -30,7 +30,7 @@ pub fn quadrotor(with_tilt: bool) -> (LoopDescription, Layout) {
         velocity: Some(format!("measured_v{axis}_m_s")),
         reference_velocity: Some(format!("reference_v{axis}_m_s")),
         desired_velocity: Some(format!("desired_v{axis}_m_s")),
-        fresh: with_tilt.then(|| Fresh { column: fresh(axis).into(), kind: FreshKind::Acceleration }),
+        fresh: fresh(axis).filter(|_| with_tilt).map(|column| Fresh { column: column.into(), kind: FreshKind::Acceleration }),
         wrap: None,
         cap: None,
         cap_rate: None,
@@ -45,17 +45,17 @@ pub fn quadrotor(with_tilt: bool) -> (LoopDescription, Layout) {
     (described, Layout { signals: Signals::from(&quadrotor::signals()), axes: channels.collect() })
 }
 
-/// Column of a flight log that goes with the acceleration of an axis.
-fn fresh(axis: &str) -> &'static str {
+/// Column of a flight log that goes with the acceleration of an axis; the vertical one is made of what is measured late.
+fn fresh(axis: &str) -> Option<&'static str> {
     match axis {
-        "x" => "measured_pitch_rad",
-        "y" => "measured_roll_rad",
-        _ => "measured_az_m_s2",
+        "x" => Some("measured_pitch_rad"),
+        "y" => Some("measured_roll_rad"),
+        _ => None,
     }
 }
 
-/// Of each axis what of the body's channels goes with its acceleration: pitch, roll, the vertical acceleration.
-const FRESH: [usize; 3] = [1, 0, 6];
+/// Of each axis what of the body's channels goes with its acceleration: pitch and roll.
+const FRESH: [usize; 2] = [1, 0];
 
 /// A flight log axis by axis.
 pub fn axis_logs(log: &FlightLog) -> Vec<AxisLog> {
@@ -72,7 +72,10 @@ pub fn axis_logs(log: &FlightLog) -> Vec<AxisLog> {
             measured: column(&|row| row.measured_position[axis]),
             velocity: column(&|row| row.measured_velocity[axis]),
             ratio: 0.0,
-            fresh: told.then(|| column(&|row| row.measured_body.map_or(0.0, |body| body[FRESH[axis]]))),
+            fresh: FRESH
+                .get(axis)
+                .filter(|_| told)
+                .map(|&channel| column(&|row| row.measured_body.map_or(0.0, |body| body[channel]))),
         }
     };
     (0..3)

@@ -1,7 +1,7 @@
 //! Feedback lane and monitor beside a network lane, whatever that was trained by, and what all of it will do.
 //!
-//! *in* logs that are ready and a way to make model files; *out* lane, monitor, predictions; *never* a lane that the logs kept apart
-//! have not judged; *source* `impromptu-training`, which does this for a simulated vehicle.
+//! *in* logs that are ready and a way to make model files; *out* lane, monitor, predictions; *never* a lane that the logs kept
+//! apart have not judged; *source* `impromptu-training`, which does this for a simulated vehicle.
 
 use impromptu_firmware::{Lanes, model::MAX_AXES};
 use impromptu_model_export::{
@@ -12,8 +12,9 @@ use impromptu_training::feedback_design::response::box_responses;
 use serde::Serialize;
 
 use crate::{
+    candidates::{DesignAxis, authority, lane_of},
     description::LoopDescription,
-    design::{Chosen, DesignAxis, Judge, NoLane, authority, lane_of},
+    design::{Chosen, Judge, NoLane},
     layout::Layout,
     prepared::{Prepared, rms},
     reading::AxisSignals,
@@ -208,5 +209,5 @@ fn monitor(request: &Request<'_>, validated_rms: f32) -> Option<MonitorDescripti
             Some(MonitorAxisDescription { error: (channels.measured[0]?, channels.desired[0]?), inputs, taps })
         });
     let axes: Vec<MonitorAxisDescription> = axes.take(MAX_AXES).collect();
-    (!axes.is_empty()).then(|| MonitorDescription { divisor: divisor as u16, validated_rms, axes })
+    (!axes.is_empty()).then_some(MonitorDescription { divisor: divisor as u16, validated_rms, axes })
 }

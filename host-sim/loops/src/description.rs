@@ -65,8 +65,8 @@ impl Accepts {
 pub enum FreshKind {
     /// Proportional to the position's rate of change: a rate gyroscope, the speed of a motor.
     Velocity,
-    /// Proportional to its acceleration, but for a constant: an accelerometer, the tilt of a vehicle that hovers, the current of a
-    /// motor with little friction.
+    /// Proportional to its acceleration, but for a constant: an accelerometer, the tilt of a vehicle that hovers, the current
+    /// of a motor with little friction.
     Acceleration,
 }
 

@@ -1,9 +1,9 @@
 //! Feedback lanes of a loop, and the choice of one of them on models of the loop.
 //!
 //! *in* models of the axes and pieces of logs that nothing was fitted to; *out* a lane, or why an axis has none; *never* a lane
-//! with which any piece, on any model that the logs leave possible, is worse than the loop alone: as logged, with further delay of
-//! the whole loop, with more or less gain; *source* `impromptu-training`, which chooses lanes for a simulated vehicle in the same
-//! cases.
+//! with which any piece, on any model that the logs leave possible, is worse than the loop alone: as logged, with further delay
+//! of the whole loop, with more or less gain; *source* `impromptu-training`, which chooses lanes for a simulated vehicle in
+//! the same cases.
 
 use impromptu_firmware::{
     Lanes,
@@ -13,84 +13,15 @@ use impromptu_model_export::{
     ExportError,
     description::{AuthorityDescription, LaneAxisDescription, LaneDescription},
 };
-use impromptu_training::feedback_design::{ArxModel, DesignRefusal, DesignSettings, LaneDesign, design};
+use impromptu_training::feedback_design::{ArxModel, DesignRefusal};
 use rayon::prelude::*;
 
 use crate::{
+    candidates::{Candidate, DesignAxis, authority, candidates, lane_of},
     layout::Layout,
-    models::Models,
     reading::AxisSignals,
     replay::{Case, Flight, Piece},
 };
-
-/// What the sizes of a loop are in those of the loop for which designs were found good: a Crazyflie's, which is 13 cm behind and
-/// has a time constant of 0.7 s.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scale {
-    /// Length, in the axis' unit for each metre.
-    pub length: f64,
-    /// Time, s a second.
-    pub time: f64,
-}
-
-/// RMS error and lag of that loop, m and s.
-const ERROR: f64 = 0.13;
-/// See [`ERROR`].
-const LAG_S: f64 = 0.7;
-/// Memory of a lane and of the model on which it is judged, s of that loop.
-const MEMORY_S: [f64; 2] = [0.25, 0.45];
-/// Control weights, weights on velocity (s²) and clamps (m) tried.
-const CONTROL_WEIGHTS: [f64; 3] = [3e-3, 6e-3, 1.2e-2];
-/// See [`CONTROL_WEIGHTS`].
-const VELOCITY_WEIGHTS: [f64; 2] = [0.05, 0.2];
-/// See [`CONTROL_WEIGHTS`].
-const FAST_LIMITS: [f64; 2] = [0.1, 0.15];
-/// Clamp of the integral, m; error and desired acceleration at which half of the fast clamp is left, m and m/s².
-const INTEGRAL_LIMIT: f64 = 0.3;
-/// See [`INTEGRAL_LIMIT`].
-const AUTHORITY: [f64; 2] = [0.1, 6.0];
-/// Time in which the recent peak of these is forgotten, s.
-const FORGOTTEN_S: f64 = 0.33;
-
-impl Scale {
-    /// Of a loop whose error and lag, s, are these.
-    pub fn of(error: f64, lag_s: f64) -> Self {
-        Self { length: (error / ERROR).max(1e-9), time: (lag_s / LAG_S).clamp(1e-4, 1e4) }
-    }
-
-    /// Settings of a design at this rate, Hz, with the memory of a loop as slow as `slowest`.
-    pub fn settings(&self, rate_hz: f64, slowest: f64) -> DesignSettings {
-        let Self { length, time } = *self;
-        let ticks = |seconds: f64| (seconds * slowest * rate_hz).round();
-        let lags = ticks(MEMORY_S[0]).clamp(6.0, 25.0) as usize;
-        let usual = DesignSettings::default();
-        let [position, velocity] = usual.least_noise;
-        DesignSettings {
-            tick: 1.0 / rate_hz,
-            lags,
-            margin_lags: (ticks(MEMORY_S[1]).clamp(10.0, 45.0) as usize).max(lags),
-            integral_weight: usual.integral_weight / (time * time),
-            noise_factor: 2.0,
-            least_noise: [position * length, velocity * length / time],
-            least_excitation: usual.least_excitation * length,
-            least_precision: usual.least_precision * time * time * 0.01 * rate_hz,
-            ..usual
-        }
-    }
-}
-
-/// An axis of which lanes are designed.
-#[derive(Clone, Debug)]
-pub struct DesignAxis<'a> {
-    /// Its models.
-    pub models: &'a Models,
-    /// Its sizes.
-    pub scale: Scale,
-    /// Settings of its designs.
-    pub settings: DesignSettings,
-    /// Index into the layout's axes.
-    pub place: usize,
-}
 
 /// A lane of one axis with what it flew.
 #[derive(Clone, Debug)]
@@ -118,7 +49,8 @@ pub enum NoLane {
     Full,
     /// None is good enough.
     #[error(
-        "of {designs} designs none left every piece of the logs better than the loop alone; the best one's worst was {worst:.0} % ({case})"
+        "of {designs} designs none left every piece of the logs better than the loop alone; the best one's worst was \
+         {worst:.0} % ({case})"
     )]
     Worse {
         /// Designs.
@@ -143,11 +75,8 @@ fn cases(rate_hz: f64, time: f64) -> [(f64, Case); 5] {
     ]
 }
 
-/// One point of the grid, designed for every axis.
-struct Candidate {
-    axes: Vec<Result<(LaneAxisDescription, Margins), DesignRefusal>>,
-    words: String,
-}
+/// Makes a model file with a lane.
+pub type Encode<'a> = dyn Fn(Option<&LaneDescription>) -> Result<Vec<u8>, ExportError> + Sync + 'a;
 
 /// What judges lanes.
 pub struct Judge<'a> {
@@ -162,100 +91,7 @@ pub struct Judge<'a> {
     /// Pieces of logs: of each the signals of every axis of the layout.
     pub pieces: Vec<Vec<&'a AxisSignals>>,
     /// Makes a model file with a lane; the network lane flies too.
-    pub encode: &'a (dyn Fn(Option<&LaneDescription>) -> Result<Vec<u8>, ExportError> + Sync),
-}
-
-/// Authority of a lane over axes of these sizes.
-pub fn authority(layout: &Layout, axes: &[DesignAxis<'_>], rate_hz: f64) -> AuthorityDescription {
-    let largest = axes.iter().map(|axis| axis.scale.length).fold(0.0, f64::max);
-    let fastest = axes.iter().map(|axis| axis.scale.length / axis.scale.time.powi(2)).fold(0.0, f64::max);
-    let slowest = axes.iter().map(|axis| axis.scale.time).fold(0.0, f64::max);
-    let channels: Vec<u8> = axes.iter().filter_map(|axis| layout.axes[axis.place].desired[2]).take(4).collect();
-    AuthorityDescription {
-        channels,
-        scale: (AUTHORITY[1] * fastest) as f32,
-        error_scale: (AUTHORITY[0] * largest) as f32,
-        decay: (-1.0 / (FORGOTTEN_S * slowest * rate_hz)).exp() as f32,
-    }
-}
-
-fn stored(
-    layout: &Layout,
-    axis: &DesignAxis<'_>,
-    output: u8,
-    designed: &LaneDesign,
-    fast_limit: f64,
-) -> (LaneAxisDescription, Margins) {
-    let channels = &layout.axes[axis.place];
-    let coefficients: Vec<f32> = designed.gain.stored_coefficients().iter().map(|value| *value as f32).collect();
-    let lags = designed.gain.lags();
-    let mut errors = Vec::new();
-    let mut error_coefficients = Vec::new();
-    for (derivative, these) in coefficients.chunks(lags).take(2).enumerate() {
-        if let (Some(measured), Some(desired)) = (channels.measured[derivative], channels.desired[derivative]) {
-            errors.push((measured, desired));
-            error_coefficients.push(these.to_vec());
-        }
-    }
-    let lane = LaneAxisDescription {
-        output,
-        errors,
-        error_coefficients,
-        output_coefficients: coefficients[2 * lags..].to_vec(),
-        integral: designed.gain.integral_coefficient as f32,
-        fast_limit: (fast_limit * axis.scale.length) as f32,
-        integral_limit: (INTEGRAL_LIMIT * axis.scale.length) as f32,
-    };
-    let margins = designed.assessment.margins.as_ref().map_or(Margins::default(), |margins| Margins {
-        delay_ms: margins.delay_milliseconds.map_or(f32::MAX, |value| value as f32),
-        gain: margins.gain_up.map_or(f32::MAX, |value| value as f32),
-        modulus: margins.modulus as f32,
-    });
-    (lane, margins)
-}
-
-fn candidates(layout: &Layout, axes: &[DesignAxis<'_>]) -> Vec<Candidate> {
-    let grid: Vec<(f64, f64)> =
-        CONTROL_WEIGHTS.iter().flat_map(|control| VELOCITY_WEIGHTS.iter().map(move |velocity| (*control, *velocity))).collect();
-    let designs: Vec<Vec<Result<LaneDesign, DesignRefusal>>> = grid
-        .par_iter()
-        .map(|&(control_weight, velocity)| {
-            let settings = |axis: &DesignAxis<'_>| DesignSettings {
-                control_weight,
-                velocity_weight: velocity * axis.scale.time * axis.scale.time,
-                ..axis.settings.clone()
-            };
-            axes.iter().map(|axis| design(&axis.models.data, &settings(axis))).collect()
-        })
-        .collect();
-    let mut candidates = Vec::new();
-    for ((control, velocity), designs) in grid.iter().zip(&designs) {
-        for fast_limit in FAST_LIMITS {
-            let axes = axes.iter().zip(designs).zip(0u8..).map(|((axis, designed), output)| match designed {
-                Ok(designed) => Ok(stored(layout, axis, output, designed, fast_limit)),
-                Err(refusal) => Err(refusal.clone()),
-            });
-            candidates.push(Candidate {
-                axes: axes.collect(),
-                words: format!("control weight {control}, e_v {velocity}, fast clamp {fast_limit}"),
-            });
-        }
-    }
-    candidates
-}
-
-/// A lane of these axes, with the smallest of their margins.
-pub fn lane_of(axes: &[(&LaneAxisDescription, Margins)], authority: AuthorityDescription) -> LaneDescription {
-    let worst = |of: fn(&Margins) -> f32| axes.iter().map(|(_, margins)| of(margins)).fold(f32::MAX, f32::min);
-    LaneDescription {
-        axes: axes.iter().map(|(lane, _)| (*lane).clone()).collect(),
-        authority,
-        margins: Margins {
-            delay_ms: worst(|margins| margins.delay_ms),
-            gain: worst(|margins| margins.gain),
-            modulus: worst(|margins| margins.modulus),
-        },
-    }
+    pub encode: &'a Encode<'a>,
 }
 
 /// How a candidate did on an axis.
@@ -322,40 +158,49 @@ impl Judge<'_> {
             .collect::<Result<_, _>>()?;
         let scores: Vec<Vec<Option<Score>>> = candidates
             .par_iter()
-            .map(|candidate| {
-                let designed: Vec<(&LaneAxisDescription, Margins)> =
-                    candidate.axes.iter().filter_map(|axis| axis.as_ref().ok()).map(|(lane, margins)| (lane, *margins)).collect();
-                if designed.is_empty() {
-                    return Ok(vec![None; axes.len()]);
-                }
-                let bytes = (self.encode)(Some(&lane_of(&designed, authority.clone())))?;
-                let mut scores: Vec<Option<Score>> = candidate
-                    .axes
-                    .iter()
-                    .map(|axis| axis.as_ref().ok().map(|_| Score { mean: 0.0, worst: f64::INFINITY, case: "" }))
-                    .collect();
-                for (bench, alone) in benches.iter().zip(&alone) {
-                    let usual = &alone[0][0];
-                    for ((weight, case), [baseline, network]) in cases.iter().zip(alone) {
-                        let errors = self.errors(bench, *case, Some((&bytes, Lanes::BOTH)))?;
-                        for (axis, score) in scores.iter_mut().enumerate() {
-                            let Some(score) = score else { continue };
-                            let of = |errors: &[Vec<f64>]| errors.iter().map(|errors| errors[axis]).collect::<Vec<_>>();
-                            // A model that swings by itself in this case is not this loop, or the loop is to blame.
-                            if rms(&of(baseline)) > SWINGS * rms(&of(usual)) {
-                                continue;
-                            }
+            .map(|candidate| self.scores(candidate, &authority, &cases, &benches, &alone))
+            .collect::<Result<_, _>>()?;
+        Ok((0..axes.len()).map(|axis| best(&candidates, &scores, axis)).collect())
+    }
+
+    /// How a candidate does on each axis. A model holds so many lanes: axes are judged as many at a time.
+    fn scores(
+        &self,
+        candidate: &Candidate,
+        authority: &AuthorityDescription,
+        cases: &[(f64, Case)],
+        benches: &[Vec<Piece<'_>>],
+        alone: &[Vec<[Vec<Vec<f64>>; 2]>],
+    ) -> Result<Vec<Option<Score>>, ExportError> {
+        let mut scores = vec![None; candidate.axes.len()];
+        let designed: Vec<(usize, &LaneAxisDescription, Margins)> = candidate
+            .axes
+            .iter()
+            .enumerate()
+            .filter_map(|(axis, designed)| designed.as_ref().ok().map(|(lane, margins)| (axis, lane, *margins)))
+            .collect();
+        for group in designed.chunks(MAX_AXES) {
+            let parts: Vec<_> = group.iter().map(|(_, lane, margins)| (*lane, *margins)).collect();
+            let bytes = (self.encode)(Some(&lane_of(&parts, authority.clone())))?;
+            for (bench, alone) in benches.iter().zip(alone) {
+                let usual = &alone[0][0];
+                for ((weight, case), [baseline, network]) in cases.iter().zip(alone) {
+                    let errors = self.errors(bench, *case, Some((&bytes, Lanes::BOTH)))?;
+                    for (axis, ..) in group {
+                        let of = |errors: &[Vec<f64>]| errors.iter().map(|errors| errors[*axis]).collect::<Vec<_>>();
+                        let score = scores[*axis].get_or_insert(Score { mean: 0.0, worst: f64::INFINITY, case: "" });
+                        // A model that swings by itself in this case is not this loop, or the loop is to blame.
+                        if rms(&of(baseline)) <= SWINGS * rms(&of(usual)) {
                             score.add(*weight / benches.len() as f64, case.name, [&of(baseline), &of(network), &of(&errors)]);
                         }
                     }
                 }
-                Ok(scores)
-            })
-            .collect::<Result<_, ExportError>>()?;
-        Ok((0..axes.len()).map(|axis| best(&candidates, &scores, axis)).collect())
+            }
+        }
+        Ok(scores)
     }
 
-    /// Reductions, %, of each axis on each set of models and each piece: [axis][flight], with errors without and with.
+    /// RMS errors without and with a model, of each axis on each set of models and each piece.
     ///
     /// # Errors
     /// If the model is refused.

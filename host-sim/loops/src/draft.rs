@@ -3,7 +3,7 @@
 //! *in* names of columns; *out* a [`LoopDescription`] to be read and completed by its owner; *never* a choice between two columns
 //! that could both be meant; *source* names in use: this project's, a Crazyflie's, PX4's, ROS', those of motor controllers.
 //!
-//! A name is cut into words at everything but letters and digits. Words that say what a column is (see [`ROLES`]), units, and
+//! A name is cut into words at everything but letters and digits. Words that say what a column is (`ROLES`), units, and
 //! kinds are taken away; what is left is the name of the axis. `x_ref` and `x`, `desired_pitch_rad` and `measured_pitch_rad`,
 //! `ctrltarget.x` and `stateEstimate.x` are an axis each.
 
@@ -59,8 +59,8 @@ const UNITS: &[(&[&str], &str, Kind)] = &[
 pub enum DraftError {
     /// Two columns for one thing.
     #[error(
-        "`{first}` and `{second}` could each be the {what} of `{axis}`; say which with --columns TIME,REFERENCE,MEASURED[,VELOCITY], \
-         once for each axis"
+        "`{first}` and `{second}` could each be the {what} of `{axis}`; say which with --columns \
+         TIME,REFERENCE,MEASURED[,VELOCITY], once for each axis"
     )]
     Ambiguous {
         /// A column.
@@ -125,13 +125,16 @@ fn read(column: &str) -> Read {
     Read { axis: if left.is_empty() { "axis".into() } else { left.join("_") }, role, kind, unit }
 }
 
+/// Columns of an axis by what they are, each with its unit.
+type Found = BTreeMap<(Option<Role>, Kind), (String, Option<&'static str>)>;
+
 /// A description of the loop whose log has these columns.
 ///
 /// # Errors
 /// If no axis is found, or a column is not the only one that could be meant.
 pub fn drafted(name: &str, header: &[String]) -> Result<LoopDescription, DraftError> {
     let time = TIMES.iter().find(|time| header.iter().any(|column| column == *time)).map_or("time_s", |time| time);
-    let mut axes: BTreeMap<String, BTreeMap<(Option<Role>, Kind), (String, Option<&'static str>)>> = BTreeMap::new();
+    let mut axes: BTreeMap<String, Found> = BTreeMap::new();
     let mut order = Vec::new();
     for column in header.iter().filter(|column| !TIMES.contains(&column.as_str())) {
         let Read { axis, role, kind, unit } = read(column);
@@ -161,7 +164,7 @@ pub fn drafted(name: &str, header: &[String]) -> Result<LoopDescription, DraftEr
     }
 }
 
-fn described(axis: &str, columns: &BTreeMap<(Option<Role>, Kind), (String, Option<&'static str>)>) -> Option<AxisDescription> {
+fn described(axis: &str, columns: &Found) -> Option<AxisDescription> {
     let column = |role, kind| columns.get(&(role, kind)).map(|(column, _)| column.clone());
     // A column without a word for what it is was measured, unless another one says so.
     let measured = |kind| column(Some(Role::Measured), kind).or_else(|| column(None, kind));

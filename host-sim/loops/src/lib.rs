@@ -7,8 +7,8 @@
 //!                            └─► replay: what both would have left of the logs kept apart
 //! ```
 //!
-//! *in* a description and logs of any loop with 1 to 8 axes; *out* a model with both lanes, limits and monitor; *never* a simulated
-//! vehicle; *source* Zhou 2017, sections III and V.
+//! *in* a description and logs of any loop with 1 to 8 axes; *out* a model with both lanes, limits and monitor; *never* a
+//! simulated vehicle; *source* Zhou 2017, sections III and V.
 //!
 //! | layer | modules | what they hold |
 //! |---|---|---|
@@ -17,13 +17,14 @@
 //! | 2 | `age`, `built_in`, `response` | how old what is measured is; loops that need no file; answers |
 //! | 3 | `models`, `replay` | what the logs leave possible; flights on it |
 //! | 4 | `machines` | loops to try it on |
-//! | 4 | `window`, `design` | the network lane; the feedback lane and its choice |
-//! | 5 | `prepared` | logs made ready |
+//! | 4 | `window`, `candidates` | the network lane; designs of the feedback lane |
+//! | 5 | `design`, `prepared` | the choice of a feedback lane; logs made ready |
 //! | 6 | `complete`, `model` | lane and monitor beside a network lane; what a model says of itself |
 //! | 7 | `training` | from logs to a model file |
 
 pub mod age;
 pub mod built_in;
+pub mod candidates;
 pub mod complete;
 pub mod description;
 pub mod design;

@@ -227,11 +227,11 @@ impl Running {
         let disturbance = 0.02 * far * frequency * frequency * 0.1;
         for _ in 0..STEPS {
             let before = self.accelerations.clone();
-            for axis in 0..self.state.len() {
+            for (axis, reference) in references.iter().enumerate() {
                 let draw = self.normal();
                 self.disturbances[axis] += -h / 0.4 * self.disturbances[axis] + disturbance * (2.0 * h / 0.4).sqrt() * draw;
                 self.told[axis].rotate_right(1);
-                self.told[axis][0] = references[axis];
+                self.told[axis][0] = *reference;
                 let told = self.told[axis][self.told[axis].len() - 1];
                 let [mut position, mut velocity, mut drive, mut drive_velocity] = self.state[axis];
                 let (at, speed) = if spring_hz > 0.0 { (drive, drive_velocity) } else { (position, velocity) };

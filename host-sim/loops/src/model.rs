@@ -1,7 +1,7 @@
 //! The windows of a loop's axes as a network, and what a model of it says of itself.
 //!
-//! *in* windows, a description, rates; *out* a network that is all skip, rows of its features, a [`Description`]; *never* limits far
-//! above the corrections of the logs, or above the application's caps; *source* the field list of the model format.
+//! *in* windows, a description, rates; *out* a network that is all skip, rows of its features, a [`Description`]; *never* limits
+//! far above the corrections of the logs, or above the application's caps; *source* the field list of the model format.
 
 use impromptu_firmware::{
     features::{Feature, Relative, Source},

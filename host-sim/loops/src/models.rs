@@ -1,8 +1,8 @@
 //! Models of an axis that its logs leave possible.
 //!
 //! *in* signals of an axis; *out* the model of longest memory, and others that could as well be the true one; *never* a model
-//! from which a vehicle is needed; *source* least-squares ARX (Ljung, System Identification, 7.3); the others are fitted to pieces
-//! of the logs drawn with replacement (Künsch 1989, block bootstrap), at a shorter memory every second one.
+//! from which a vehicle is needed; *source* least-squares ARX (Ljung, System Identification, 7.3); the others are fitted to
+//! pieces of the logs drawn with replacement (Künsch 1989, block bootstrap), at a shorter memory every second one.
 
 use impromptu_training::feedback_design::{ArxModel, AxisLog, DesignRefusal, DesignSettings, IdentificationData};
 use rand::{RngExt as _, SeedableRng as _};
@@ -39,7 +39,7 @@ pub fn axis_log(signals: &AxisSignals) -> AxisLog<'_> {
 /// Ratios tried, in time constants of the loop: none, and those of PD loops of little to much damping.
 const RATIOS: [f64; 9] = [0.0, 0.5, 0.62, 0.74, 0.86, 0.98, 1.1, 1.25, 1.4];
 /// Ticks of logs that are looked at.
-const LOOKED_AT: usize = 30_000;
+const LOOKED_AT: usize = 24_000;
 
 /// What a velocity reference weighs beside the position reference of each axis, s, of a loop that adds them up before anything
 /// else: the ratio at which one combined reference explains most; 0 where it weighs nothing, which is true of all axes or none.

@@ -10,8 +10,8 @@ use impromptu_training::{
 use rayon::prelude::*;
 
 use crate::{
+    candidates::Scale,
     description::LoopDescription,
-    design::Scale,
     models::{Models, ratios_of_references},
     reading::{AxisLog, AxisSignals},
     response::time_constant,

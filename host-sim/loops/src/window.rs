@@ -1,7 +1,8 @@
 //! The network lane of an axis: a window over the desired position, fitted to the errors that the loop itself left.
 //!
-//! *in* logs of an axis and a model of it; *out* weights of the window; *never* a correction learned from noise in its own inputs:
-//! these are the desired trajectory, which has none; *source* Zhou 2017, Insight 3 (difference learning): features relative to
+//! *in* logs of an axis and a model of it; *out* weights of the window; *never* a correction learned from noise in its own
+//! inputs: these are the desired trajectory, which has none; *source* Zhou 2017, Insight 3 (difference learning): features
+//! relative to
 //! now. What differs: the paper learns the inverse with the measured output in the place of the desired one; here the error that
 //! was logged is regressed on what the window would have done to it through the identified loop (filtered-x, Widrow and Walach
 //! 1996), which needs no stable inverse and is not biased by measurement noise.

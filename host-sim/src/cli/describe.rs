@@ -19,8 +19,8 @@ use super::Invocation;
 Prints the description as TOML, or writes it with --output. What the names of the columns do not say is left at its default: read
 it, complete unit, frame, caps and age, then train with it. Keys of an axis: name, unit, frame, accepts (position,
 position_velocity or position_velocity_feed_forward), the columns reference, measured and, where there are any, desired, velocity,
-reference_velocity, desired_velocity; fresh = { column, kind = \"acceleration\" or \"velocity\" } for a signal that is fresher than
-the measured position, wrap for an angle that wraps, cap and cap_rate for the largest correction and its fastest change.
+reference_velocity, desired_velocity; fresh = { column, kind = \"acceleration\" or \"velocity\" } for a signal that is fresher
+than the measured position, wrap for an angle that wraps, cap and cap_rate for the largest correction and its fastest change.
 
 Examples:
   host-sim describe --log motor.csv

@@ -19,7 +19,7 @@ pub struct Breakdown {
 }
 
 /// Splits logs into sound ones and those in which the loop broke down.
-pub(crate) fn sound(logs: &[FlightLog]) -> (Vec<&FlightLog>, Vec<Breakdown>) {
+pub fn sound(logs: &[FlightLog]) -> (Vec<&FlightLog>, Vec<Breakdown>) {
     let errors: Vec<f64> = logs.iter().map(largest_error).collect();
     let bound = largest_sound_error(&errors);
     let (mut kept, mut broken) = (Vec::new(), Vec::new());

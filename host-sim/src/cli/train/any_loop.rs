@@ -7,12 +7,12 @@ use impromptu_diagnosis::digits::digits;
 use impromptu_files::reading;
 use impromptu_loops::{
     LoopDescription, Settings,
-    age::{Age, UnknownAge, cost, estimated},
+    age::{Age, UnknownAge, cost, estimated, pooled},
     built_in::{QUADROTOR, axis_logs, quadrotor},
     complete::{AxisFit, Request, complete},
     layout::Layout,
     prepared::{prepared, time_constant_s},
-    reading::{AxisLog, header, read},
+    reading::{AxisLog, AxisSignals, header, read},
     train,
 };
 use impromptu_model_export::{
@@ -22,6 +22,7 @@ use impromptu_model_export::{
 use impromptu_sim::flight_log::FlightLog;
 use impromptu_training::{
     LaneChoice, LaneRefusal, LearnSettings, Learned, Pipeline, Trained,
+    breakdown::sound,
     files::{model_files, write_set},
     observer::Observer as _,
 };
@@ -120,7 +121,7 @@ fn found_age(described: &LoopDescription, logs: &[Vec<AxisLog>], invocation: &In
             found.push((&axis.name, age));
         }
     }
-    let Some((axis, age)) = found.into_iter().min_by(|(_, a), (_, b)| a.error_s.total_cmp(&b.error_s)) else {
+    let Some(age) = pooled(&found.iter().map(|(_, age)| *age).collect::<Vec<_>>()) else {
         let fresh = described.axes.iter().any(|axis| axis.fresh.is_some());
         let why = if fresh { "the fresher signal does not go with it" } else { "the logs hold nothing fresher" };
         let axis = &described.axes[0];
@@ -128,17 +129,19 @@ fn found_age(described: &LoopDescription, logs: &[Vec<AxisLog>], invocation: &In
         return Err(UnknownAge { why: why.into(), cost: cost(&signals, &axis.unit, &axis.name) });
     };
     invocation.console.note(&format!(
-        "what is measured is {:.0} ms old (± {:.1} ms, by the fresher signal of axis {axis}); --delay-ms says otherwise",
+        "what is measured is {:.0} ms old (± {:.1} ms, by the fresher signal of axis {}); --delay-ms says otherwise",
         1e3 * age.seconds,
-        2e3 * age.error_s
+        2e3 * age.error_s,
+        found.iter().map(|(axis, _)| *axis).collect::<Vec<_>>().join(", ")
     ));
     Ok(age.seconds)
 }
 
 /// The age of what flight logs measured, s: that which attitude tells, or the usual one with a warning.
 pub(super) fn age_of_flights(logs: &[FlightLog], invocation: &Invocation) -> f64 {
-    let axes: Vec<Vec<AxisLog>> = logs.iter().map(axis_logs).collect();
-    let with_tilt = axes.iter().flatten().all(|log| log.signals.fresh.is_some());
+    let (sound, _) = sound(logs);
+    let axes: Vec<Vec<AxisLog>> = sound.into_iter().map(axis_logs).collect();
+    let with_tilt = axes.iter().flatten().any(|log| log.signals.fresh.is_some());
     found_age(&quadrotor(with_tilt).0, &axes, invocation).unwrap_or_else(|unknown| {
         invocation.console.note(&format!("warning: taken to be {:.0} ms old: {unknown}", 1e3 * USUAL_AGE_S));
         USUAL_AGE_S
@@ -147,6 +150,17 @@ pub(super) fn age_of_flights(logs: &[FlightLog], invocation: &Invocation) -> f64
 
 /// Age of a position from motion capture over radio, s.
 const USUAL_AGE_S: f64 = 0.024;
+
+/// What logs without dither lack, and what it would add.
+const NO_DITHER: &str = "no log has a dither, which tells what a correction does: add a dither to the position reference (1 cm, a \
+                         new random sign every 50 ms) on flights of a few minutes and give their logs as --dithered; it would add \
+                         the feedback lane, which removes most of what the network lane leaves, and the guard's monitor";
+
+/// Whether a reference is more than what is desired.
+fn dithers(signals: &AxisSignals) -> bool {
+    let away = signals.reference.iter().zip(&signals.base).map(|(reference, base)| (reference - base).abs());
+    away.fold(0.0, f64::max) > 1e-9
+}
 
 /// Lane and monitor from flight logs alone, beside a network.
 pub(super) fn beside(
@@ -158,13 +172,19 @@ pub(super) fn beside(
 ) -> Result<(Trained, Vec<AxisFit>)> {
     let LearnSettings { recipe, seed, measurement_delay_s, .. } = &pipeline.settings;
     let (described, layout) = quadrotor(false);
-    let axes: Vec<Vec<AxisLog>> = logs.iter().map(axis_logs).collect();
+    let (sound, _) = sound(logs);
+    let axes: Vec<Vec<AxisLog>> = sound.into_iter().map(axis_logs).collect();
     let file = |lane: Option<&LaneDescription>, monitor: Option<&MonitorDescription>, remarks: &str| {
         let description = Description { monitor: monitor.cloned(), ..pipeline.describe(learned, lane, name, remarks) };
         Ok::<_, ExportError>((learned.encode(&description)?, description))
     };
     let places: Vec<usize> = (0..layout.axes.len()).collect();
-    let completed = prepared(&described, &axes, &places, true, (DRAWS, *seed)).map_err(|error| error.to_string()).map(|ready| {
+    let dithered = axes.iter().flatten().any(|log| dithers(&log.signals));
+    let ready = match dithered {
+        true => prepared(&described, &axes, &places, true, (DRAWS, *seed)).map_err(|error| error.to_string()),
+        false => Err(NO_DITHER.into()),
+    };
+    let completed = ready.map(|ready| {
         complete(&Request {
             described: &described,
             layout: &layout,
@@ -218,8 +238,8 @@ pub(super) fn fit_rows(fit: &AxisFit) -> [[String; 2]; 2] {
         [
             format!("axis {axis}"),
             format!(
-                "{error} {unit} alone on logs kept apart, {with_network} with the network lane, {with_both} with both: {mean:.0} % less \
-                 ({low:.0} … {high:.0})"
+                "{error} {unit} alone on logs kept apart, {with_network} with the network lane, {with_both} with both: \
+                 {mean:.0} % less ({low:.0} … {high:.0})"
             ),
         ],
         [

@@ -23,8 +23,8 @@ A log is a CSV file with a header; SI units, world frame ENU (x east, y north, z
   measured_x_m, measured_y_m, measured_z_m      position as the loop was told, as late as it was told, m
   measured_vx_m_s, measured_vy_m_s, measured_vz_m_s
                                                 velocity as the loop was told, m/s
-  measured_roll_rad, measured_pitch_rad, measured_yaw_rad, measured_wx_rad_s, measured_wy_rad_s, measured_wz_rad_s, measured_az_m_s2
-                                                attitude, body rates and vertical acceleration as the loop was told, which
+  measured_roll_rad, measured_pitch_rad, measured_yaw_rad, measured_wx_rad_s, measured_wy_rad_s, measured_wz_rad_s,
+  measured_az_m_s2                              attitude, body rates and vertical acceleration as the loop was told, which
                                                 are fresher than the position: its age is found from them (may be absent)
   true_x_m, true_y_m, true_z_m                  true position, m (simulators only, may be absent)
 Further columns are ignored.
@@ -36,10 +36,13 @@ To convert the log of another simulator or of a real vehicle:
   4. Without an add-on, `reference` equals `desired`, but for a dither.
   5. Begin a new file where the log has a gap, a take-off or a landing.
 For the feedback lane add random steps to the position reference (1 cm, a new sign every 50 ms on each axis), log `reference` with
-and `desired` without them, and give these logs as --dithered. The lane is chosen by flights in the simulator, so it also needs
---vehicle; without it the model has the network lane alone.
+and `desired` without them, and give these logs as --dithered. With --vehicle the lane is chosen by flights in the simulator,
+without it on models of the loop that the logs leave possible. Without dither the model has the network lane alone.
+
+Any other loop: describe it (`host-sim describe --log X.csv` drafts the file), then `train --loop`.
 
 Examples:
   host-sim train --log logs/*.csv --dithered dithered/*.csv --vehicle crazyflie --condition lab --out models
   host-sim train --log monday.csv tuesday.csv --delay-ms 30 --smoothing-ms 60 --name mine --out models
+  host-sim train --loop gantry.toml --log gantry-*.csv --axis x --out models
   host-sim train --log logs/*.csv --recipe quick.toml --seed 7 --out models";

@@ -20,8 +20,8 @@ pub fn impulse_response(model: &ArxModel, ticks: usize) -> Vec<f64> {
     simulate(model, &|tick| [f64::from(u8::from(tick == 0)), 0.0], 1, ticks)
 }
 
-/// The position to which a velocity reference of 1 leads in the end, s: what it weighs beside the position reference, so far as the
-/// loop adds the two up before anything else.
+/// The position to which a velocity reference of 1 leads in the end, s: what it weighs beside the position reference, so far
+/// as the loop adds the two up before anything else.
 pub fn velocity_weight(model: &ArxModel, ticks: usize) -> f64 {
     simulate(model, &|_| [0.0, 1.0], 1, ticks).last().copied().unwrap_or(0.0)
 }
