@@ -152,9 +152,10 @@ pub(super) fn age_of_flights(logs: &[FlightLog], invocation: &Invocation) -> f64
 const USUAL_AGE_S: f64 = 0.024;
 
 /// What logs without dither lack, and what it would add.
-const NO_DITHER: &str = "no log has a dither, which tells what a correction does: add a dither to the position reference (1 cm, a \
-                         new random sign every 50 ms) on flights of a few minutes and give their logs as --dithered; it would add \
-                         the feedback lane, which removes most of what the network lane leaves, and the guard's monitor";
+const NO_DITHER: &str = "\
+no log has a dither, which tells what a correction does: add a dither to the position reference (1 cm, a new random sign every \
+50 ms) on flights of a few minutes and give their logs as --dithered; it would add the feedback lane, which removes most of what \
+the network lane leaves, and the guard's monitor";
 
 /// Whether a reference is more than what is desired.
 fn dithers(signals: &AxisSignals) -> bool {
