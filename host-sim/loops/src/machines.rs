@@ -10,6 +10,7 @@ use impromptu_firmware::{
     Lanes,
     model::{MAX_CHANNELS, Model, Refusal},
 };
+use impromptu_model_export::description::Signals;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -36,9 +37,7 @@ pub enum Machine {
 
 /// What the axes of a machine are.
 struct Plant {
-    /// Names.
     axes: &'static [&'static str],
-    /// Unit.
     unit: &'static str,
     /// References a second.
     rate_hz: f64,
@@ -60,7 +59,6 @@ struct Plant {
     age_s: f64,
     /// Noise of position and velocity.
     noise: [f64; 2],
-    /// Dither.
     dither: f64,
 }
 
@@ -322,9 +320,12 @@ pub fn logged(machine: Machine, desired: &[Vec<f64>], dithered: bool, seed: u64)
 /// Why a model does not fly a machine.
 #[derive(Debug, thiserror::Error)]
 pub enum FlyError {
-    /// It is for another loop.
+    /// It is refused.
     #[error(transparent)]
     Refused(#[from] Refusal),
+    /// It is for another loop.
+    #[error("the model is of `{0}`, whose signals this machine does not have: train one on this machine's logs")]
+    Other(String),
     /// The machine has more channels than a model.
     #[error(transparent)]
     Channels(#[from] TooManyChannels),
@@ -341,6 +342,11 @@ pub fn flown(
     seed: u64,
 ) -> Result<Vec<f64>, FlyError> {
     let layout = Layout::of(&machine.description())?;
+    if let Some((model, _)) = model
+        && Signals::from(&model.card().signals) != layout.signals
+    {
+        return Err(FlyError::Other(model.card().provenance.vehicle.into()));
+    }
     let mut running = Running::new(machine, seed);
     let velocities: Vec<Vec<f64>> = desired.iter().map(|desired| slope(desired, running.plant.rate_hz)).collect();
     let mut add_on: Option<(Box<HostAddOn<'_>>, i32)> = match model {

@@ -13,6 +13,7 @@ mod fly;
 mod learn;
 mod learned_file;
 mod log_reading;
+mod machine;
 mod model_file;
 mod output;
 mod processor;
@@ -109,6 +110,8 @@ enum Command {
     Diagnose(diagnose::Diagnose),
     /// Replays logs of any loop through the learner: predicts what it would have left of each next flight's error.
     Learn(learn::Learn),
+    /// Writes logs of a simulated machine that is no quadrotor, or moves it with a model.
+    Machine(machine::MachineCommand),
     /// Makes a model from flight logs, simulated or real.
     Train(train::Train),
     /// Flies a trajectory with the baseline and with a model.
@@ -132,7 +135,9 @@ impl Command {
             Self::Fly(command) => command.conflict(),
             Self::Evaluate(command) => command.conflict(),
             Self::Study(command) => command.conflict(),
-            Self::Describe(_) | Self::Diagnose(_) | Self::Learn(_) | Self::Report(_) | Self::Trajectory(_) => None,
+            Self::Describe(_) | Self::Diagnose(_) | Self::Learn(_) | Self::Machine(_) | Self::Report(_) | Self::Trajectory(_) => {
+                None
+            }
         }
     }
 }
@@ -218,6 +223,7 @@ fn execute(arguments: Arguments, console: &Console, command: String) -> Result<(
         Some(Command::Describe(command)) => command.run(&invocation),
         Some(Command::Diagnose(command)) => command.run(&invocation),
         Some(Command::Learn(command)) => command.run(&invocation),
+        Some(Command::Machine(command)) => command.run(&invocation),
         Some(Command::Train(command)) => command.run(&invocation),
         Some(Command::Fly(command)) => command.run(&invocation),
         Some(Command::Evaluate(command)) => command.run(&invocation),

@@ -110,6 +110,22 @@ fn without_a_vehicle_both_lanes_and_the_monitor_come_from_the_logs() {
     assert!(both > 90.0 && both > network, "{flown}");
 }
 
+#[test]
+fn a_machine_is_logged_trained_and_moved() {
+    let folder = Folder::new();
+    folder.fine("machine gantry --motions 3 --seconds 45 --out gantry");
+    let logs = folder.files("gantry", ".csv").join(" ");
+    // The drive's acceleration is in the logs: the age of what is measured is found.
+    let run = folder.fine(&format!("train --loop gantry/gantry.toml --log {logs} --name gantry --out models --format json"));
+    assert!(run.stderr.contains("ms old (±") && (run.json()["age_ms"].as_f64().unwrap() - 5.0).abs() < 3.0, "{}", run.stderr);
+    let moved = folder.fine("machine gantry --motions 3 --seconds 20 --model models/gantry.impromptu --format json").json();
+    for axis in moved["axes"].as_array().unwrap() {
+        assert!(axis["reduction_percent"][1].as_f64().unwrap() > 90.0, "{moved}");
+    }
+    folder.refused("machine servo --model models/gantry.impromptu", &["gantry.impromptu"]);
+    assert_eq!(folder.run("machine crane").code, 2);
+}
+
 /// A log of a servo of second order with dither on its reference, as somebody's program would write it.
 fn servo_log(seed: u64) -> String {
     let mut state = seed | 1;
