@@ -13,9 +13,17 @@ use impromptu_flight::flight::Rates;
 use impromptu_loops::complete::AxisFit;
 use impromptu_sim::{controller::Controller, flight_log::FlightLog, flights::Loop};
 use impromptu_training::{
-    AxisGates, LearnError, LearnSettings, Learned, Pipeline, Purpose, Recipe, Trained, Validation, check_gates, derived,
-    dithered_logs, files::model_files, in_words, learn::few_rows, learned_in_flight, observer::Observer as _, smoothing,
-    supervised::Progress, write_model_files,
+    AxisGates, LearnError, LearnSettings, Learned, Pipeline, Purpose, Recipe, Trained, Validation, check_gates,
+    coverage::{Coverage, coverage},
+    derived, dithered_logs,
+    files::model_files,
+    in_words,
+    learn::few_rows,
+    learned_in_flight,
+    observer::Observer as _,
+    smoothing,
+    supervised::Progress,
+    write_model_files,
 };
 use serde::Serialize;
 
@@ -26,6 +34,7 @@ use super::{
     log_reading::LogReading,
     output::table,
     situation::{closed_loop, controller, flown_by, gains_conflict, milliseconds},
+    trajectory::find,
 };
 
 /// Arguments of `train`.
@@ -71,6 +80,9 @@ pub(super) struct Train {
     /// Condition of the validation flights.
     #[arg(long, value_name = "NAME|FILE.toml", default_value = "lab", requires = "vehicle")]
     condition: String,
+    /// Trajectories that shall be flown (name or CSV file): says what of them lies outside of what was trained on.
+    #[arg(long, value_name = "NAME|FILE.csv", num_args = 1.., conflicts_with = "described")]
+    test: Vec<String>,
     /// Name of the model and of its files.
     #[arg(long, default_value = "model", value_parser = file_name)]
     name: String,
@@ -107,6 +119,8 @@ struct Summary {
     minutes: f64,
     /// Of each axis what its lanes will do, where the feedback lane was chosen on the logs.
     axes: Vec<AxisFit>,
+    /// What of the trajectories that shall be flown lies outside of what was trained on.
+    coverage: Vec<Coverage>,
     files: Vec<PathBuf>,
 }
 
@@ -153,6 +167,7 @@ impl Train {
             None => invocation.configuration.recipe().clone(),
         };
         let origin = self.origin(&recipe)?;
+        let tests = self.test.iter().map(|name| find(name).context("--test")).collect::<Result<Vec<_>>>()?;
         invocation.console.note(&format!("seed {seed}"));
         let folder = invocation.configuration.folder()?;
         self.check_outputs(invocation, &folder)?;
@@ -162,6 +177,9 @@ impl Train {
         };
         let Trained { lane, description, model } = trained;
         invocation.console.note(&in_words(&lane));
+        let rate_hz = f64::from(description.timing.reference_rate_hz);
+        let coverage = tests.into_iter().map(|motion| Ok(coverage(&description, &motion.sampled(rate_hz)?)));
+        let coverage = coverage.collect::<Result<Vec<Coverage>>>()?;
         let (design, refusal) = match lane {
             Ok(choice) => (Some(choice.design), None),
             Err(reason) => (None, Some(reason.to_string())),
@@ -179,6 +197,7 @@ impl Train {
             overridden,
             minutes,
             axes: fits,
+            coverage,
             files,
         };
         invocation.format.print(&trained, || text(&trained))
@@ -207,11 +226,13 @@ impl Train {
         invocation.console.stage("designing the feedback lane");
         let overridden = self.overridden(invocation, recipe, &learned, gates.overridden, rate_hz);
         let identification = if dithered.is_empty() { &logs } else { &dithered };
-        let (trained, fits) = match origin.closed_loop {
-            Some(_) => (pipeline.complete(&learned, identification, &self.name, overridden.as_deref())?, Vec::new()),
-            None => any_loop::beside(&pipeline, &learned, identification, &self.name, overridden.as_deref())?,
-        };
         let minutes = logs.iter().chain(&dithered).map(|log| log.rows.len() as f64 / log.rate_hz).sum::<f64>() / 60.0;
+        let remark = [Some(format!("{minutes:.1} min of flight")), overridden.clone()].into_iter().flatten().collect::<Vec<_>>();
+        let remark = remark.join("; ");
+        let (trained, fits) = match origin.closed_loop {
+            Some(_) => (pipeline.complete(&learned, identification, &self.name, Some(&remark))?, Vec::new()),
+            None => any_loop::beside(&pipeline, &learned, identification, &self.name, Some(&remark))?,
+        };
         Ok(Made { learned, trained, gates: gates.axes, overridden, fits, minutes })
     }
 
@@ -372,6 +393,7 @@ fn text(trained: &Summary) -> String {
         ["feedback lane".to_owned(), lane],
     ];
     rows.extend(trained.axes.iter().flat_map(any_loop::fit_rows));
+    rows.extend(trained.coverage.iter().map(|coverage| ["test".to_owned(), coverage.words()]));
     rows.extend(trained.files.iter().map(|file| ["file".to_owned(), file.display().to_string()]));
     table(["", "result"], 2, rows)
 }

@@ -96,14 +96,21 @@ fn without_a_vehicle_both_lanes_and_the_monitor_come_from_the_logs() {
     let folder = Folder::new();
     folder.fine("collect --condition lab --dither 0.01 --flights 4 --seconds 60 --out dithered");
     let logs = folder.files("dithered", ".csv").join(" ");
-    let run = folder.fine(&format!("train --log {logs} --recipe recipe.toml --out models --format json"));
+    folder.fine("trajectory figure8 --speed 4 --output fast.csv");
+    let run = folder.fine(&format!("train --log {logs} --recipe recipe.toml --test figure8 fast.csv --out models --format json"));
     let trained = run.json();
     // Attitude is in the logs, and fresher than the position, which is 24 ms old.
     let age = run.stderr.split("what is measured is ").nth(1).and_then(|text| text.split(' ').next()?.parse::<f64>().ok());
     assert!(age.is_some_and(|age| (age - 24.0).abs() <= 6.0), "{}", run.stderr);
     assert!(trained["refusal"].is_null() && (trained["minutes"].as_f64().unwrap() - 4.17).abs() < 0.05, "{trained}");
+    // A figure of eight as wide as what was flown, and one that is four times as fast.
+    assert!(
+        trained["coverage"][0]["handed_over_percent"].as_f64().unwrap()
+            < trained["coverage"][1]["handed_over_percent"].as_f64().unwrap()
+    );
     let bytes = folder.read("models/model.impromptu");
     let model = Model::from_bytes(&bytes).unwrap();
+    assert!(model.card().provenance.remarks.ends_with("4.2 min of flight"), "{}", model.card().provenance.remarks);
     assert!(model.feedback().is_some_and(|lane| lane.axes().len() == 3) && model.monitor().is_some());
     let flown = folder.fine("evaluate --model models/model.impromptu --strokes 5 --seed 3 --format json").json();
     let [network, both] = [1, 3].map(|row: usize| flown["table"][row]["reduction_mean"].as_f64().unwrap());
@@ -113,12 +120,12 @@ fn without_a_vehicle_both_lanes_and_the_monitor_come_from_the_logs() {
 #[test]
 fn a_machine_is_logged_trained_and_moved() {
     let folder = Folder::new();
-    folder.fine("machine gantry --motions 3 --seconds 45 --out gantry");
+    folder.fine("machine gantry --out gantry");
     let logs = folder.files("gantry", ".csv").join(" ");
     // The drive's acceleration is in the logs: the age of what is measured is found.
     let run = folder.fine(&format!("train --loop gantry/gantry.toml --log {logs} --name gantry --out models --format json"));
     assert!(run.stderr.contains("ms old (±") && (run.json()["age_ms"].as_f64().unwrap() - 5.0).abs() < 3.0, "{}", run.stderr);
-    let moved = folder.fine("machine gantry --motions 3 --seconds 20 --model models/gantry.impromptu --format json").json();
+    let moved = folder.fine("machine gantry --motions 3 --model models/gantry.impromptu --format json").json();
     for axis in moved["axes"].as_array().unwrap() {
         assert!(axis["reduction_percent"][1].as_f64().unwrap() > 90.0, "{moved}");
     }

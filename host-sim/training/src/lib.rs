@@ -23,6 +23,7 @@
 //! | 1 | `feedback_design` | identification and design of the feedback lane |
 //! | 1 | `channel`, `breakdown`, `hold_out` | channels of logs; flights that teach nothing; logs that are held out |
 //! | 1 | `purpose`, `observer` | seeds; who watches |
+//! | 1 | `coverage` | trajectories beside what was trained on |
 //! | 2 | `examples`, `gates` | rows of features from logs; the diagnosis before a training |
 //! | 2 | `track` | axes of the logs of any loop, for a replay |
 //! | 2 | `recipe` | everything that decides, as data |
@@ -39,6 +40,7 @@ pub mod breakdown;
 pub mod build;
 pub mod bypass;
 pub mod channel;
+pub mod coverage;
 pub mod error;
 pub mod examples;
 pub mod feedback_design;
