@@ -1,7 +1,7 @@
 //! What of a trajectory lies outside of what was trained on.
 //!
-//! *in* a description, trajectories; *out* shares of their ticks; *never* a feature that the firmware computes otherwise; *source*
-//! the training box of the guard: least and greatest value of each feature, and its margin beyond them.
+//! *in* a description, trajectories; *out* shares of their ticks; *never* a feature that the firmware computes otherwise;
+//! *source* the training box of the guard: least and greatest value of each feature, and its margin beyond them.
 
 use impromptu_firmware::{
     features::{Signals, evaluate},
