@@ -282,6 +282,18 @@ mod tests {
     }
 
     #[test]
+    fn the_example_is_one() {
+        let lines =
+            include_str!("description.rs").lines().filter_map(|line| line.strip_prefix("//! ").or(line.strip_prefix("//!")));
+        let example: Vec<&str> = lines.skip_while(|line| *line != "```toml").skip(1).take_while(|line| *line != "```").collect();
+        let described = LoopDescription::parse(&example.join("\n")).unwrap();
+        let axis = &described.axes[0];
+        assert_eq!((described.name.as_str(), described.rate_hz, described.age_ms), ("gantry", Some(200.0), Some(5.0)));
+        assert_eq!((axis.accepts, axis.wrap, axis.cap), (Accepts::PositionVelocity, Some(360.0), Some(0.05)));
+        assert!(axis.fresh.as_ref().is_some_and(|fresh| fresh.kind == FreshKind::Acceleration));
+    }
+
+    #[test]
     fn what_no_loop_has_is_refused_by_its_key() {
         for (change, named) in [
             ("name = \"gantry\"\nrate_hz = 5000.0\n", "rate_hz: 5000 is not from 10 to 2000"),
