@@ -135,14 +135,13 @@ impl<'a> Piece<'a> {
             judged += usize::from(scored);
             for axis in 0..axes {
                 let signals = self.signals[axis];
-                let late = tick.saturating_sub(case.delay);
-                let ([position, velocity], [older, slower]) = (seen[axis][tick], seen[axis][late]);
+                let [position, _] = seen[axis][tick];
+                let [moved, faster] = since(&seen[axis], tick, case.delay);
                 let [delta, rate] = corrections[axis].map(|correction| case.gain * correction);
                 // A combined reference takes the velocity's correction with the position's.
                 let apart = if signals.ratio > 0.0 { 0.0 } else { rate };
                 told[axis][tick] = [
-                    signals.base[tick] + delta + signals.ratio * rate + position - older
-                        + self.weights[axis] * (velocity - slower),
+                    signals.base[tick] + delta + signals.ratio * rate + moved + self.weights[axis] * faster,
                     signals.reference_velocity[tick] + apart,
                 ];
                 if scored {
@@ -155,6 +154,14 @@ impl<'a> Piece<'a> {
         }
         squares.iter().map(|square| (square / judged.max(1) as f64).sqrt()).collect()
     }
+}
+
+/// What position and velocity have changed by in the last `delay` ticks, in means of two: what alternates from tick to tick is
+/// noise, and how the loop answers to that no log shows.
+fn since(seen: &[[f64; 2]], tick: usize, delay: usize) -> [f64; 2] {
+    let mean = |tick: usize| [0, 1].map(|index| 0.5 * (seen[tick][index] + seen[tick.saturating_sub(1)][index]));
+    let ([position, velocity], [older, slower]) = (mean(tick), mean(tick.saturating_sub(delay)));
+    [position - older, velocity - slower]
 }
 
 fn pairs(signals: &AxisSignals) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {

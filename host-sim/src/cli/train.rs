@@ -226,9 +226,10 @@ impl Train {
         invocation.console.stage("designing the feedback lane");
         let overridden = self.overridden(invocation, recipe, &learned, gates.overridden, rate_hz);
         let identification = if dithered.is_empty() { &logs } else { &dithered };
-        let minutes = logs.iter().chain(&dithered).map(|log| log.rows.len() as f64 / log.rate_hz).sum::<f64>() / 60.0;
-        let remark = [Some(format!("{minutes:.1} min of flight")), overridden.clone()].into_iter().flatten().collect::<Vec<_>>();
-        let remark = remark.join("; ");
+        let others = self.dithered.iter().zip(&dithered).filter(|(path, _)| !self.log.contains(path)).map(|(_, log)| log);
+        let minutes = logs.iter().chain(others).map(|log| log.rows.len() as f64 / log.rate_hz).sum::<f64>() / 60.0;
+        let remark =
+            Vec::from_iter([Some(format!("{minutes:.1} min of flight")), overridden.clone()].into_iter().flatten()).join("; ");
         let (trained, fits) = match origin.closed_loop {
             Some(_) => (pipeline.complete(&learned, identification, &self.name, Some(&remark))?, Vec::new()),
             None => any_loop::beside(&pipeline, &learned, identification, &self.name, Some(&remark))?,
