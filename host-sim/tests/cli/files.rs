@@ -169,7 +169,7 @@ fn a_training_that_is_killed_late_leaves_one_set() {
     let folder = Folder::new();
     folder.fine("collect --condition clean --signal strokes --flights 4 --out logs");
     let logs = folder.files("logs", ".csv").join(" ");
-    let train = format!("train --log {logs} --recipe recipe.toml --out models --quiet");
+    let train = format!("train --log {logs} --delay-ms 0 --recipe recipe.toml --out models --quiet");
     folder.fine(&train);
     assert!(is_whole(&folder, "models/model"));
     let first = folder.read("models/model.impromptu");
