@@ -8,6 +8,7 @@
 //!
 //! The band lies where the loop's own motions are: the constant, and what drifts in an integral, is below it; noise above.
 
+use impromptu_diagnosis::prediction::root_mean_square;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
 use crate::{
@@ -185,13 +186,8 @@ pub fn pooled(ages: &[Age]) -> Option<Age> {
 
 /// What a wrong age costs, in words: what moves is as far off as it goes in that time.
 pub fn cost(logs: &[&AxisSignals], unit: &str, axis: &str) -> String {
-    let speeds = logs.iter().flat_map(|signals| &signals.desired_velocity);
-    let (sum, count) = speeds.fold((0.0, 0usize), |(sum, count), speed| (sum + speed * speed, count + 1));
-    let speed = (sum / count.max(1) as f64).sqrt();
-    let error = {
-        let (sum, count) = logs.iter().fold((0.0, 0usize), |(sum, count), signals| (sum + signals.error().powi(2), count + 1));
-        (sum / count.max(1) as f64).sqrt()
-    };
+    let speed = root_mean_square(logs.iter().flat_map(|signals| signals.desired_velocity.iter().copied()));
+    let error = root_mean_square(logs.iter().map(|signals| signals.error()));
     let share = 100.0 * 0.01 * speed / error.max(1e-12);
     format!("Axis {axis}: 10 ms wrong leave {:.2e} {unit} more, {share:.0} % of the error in the logs", 0.01 * speed)
 }

@@ -20,20 +20,14 @@ pub const QUADROTOR: &str = "quadrotor";
 /// the tilt.
 pub fn quadrotor(with_tilt: bool) -> (LoopDescription, Layout) {
     let axes = ["x", "y", "z"].into_iter().map(|axis| AxisDescription {
-        name: axis.into(),
-        unit: "m".into(),
         frame: "world ENU".into(),
         accepts: Accepts::PositionVelocity,
-        reference: format!("reference_{axis}_m"),
-        measured: format!("measured_{axis}_m"),
         desired: Some(format!("desired_{axis}_m")),
         velocity: Some(format!("measured_v{axis}_m_s")),
         reference_velocity: Some(format!("reference_v{axis}_m_s")),
         desired_velocity: Some(format!("desired_v{axis}_m_s")),
         fresh: fresh(axis).filter(|_| with_tilt).map(|column| Fresh { column: column.into(), kind: FreshKind::Acceleration }),
-        wrap: None,
-        cap: None,
-        cap_rate: None,
+        ..AxisDescription::new(axis, "m", format!("reference_{axis}_m"), format!("measured_{axis}_m"))
     });
     let described =
         LoopDescription { name: QUADROTOR.into(), time: "time_s".into(), rate_hz: None, age_ms: None, axes: axes.collect() };

@@ -3,9 +3,9 @@
 //! *in* models of the axes; *out* lanes as a model stores them, not flown yet; *never* a size that the loop's own error and time
 //! constant do not give; *source* the grid of `impromptu-training`, scaled.
 
-use impromptu_firmware::model::Margins;
+use impromptu_firmware::model::{MAX_AXES, Margins};
 use impromptu_model_export::description::{AuthorityDescription, LaneAxisDescription, LaneDescription};
-use impromptu_training::feedback_design::{DesignRefusal, DesignSettings, LaneDesign, design};
+use impromptu_training::feedback_design::{DesignRefusal, DesignSettings, LaneDesign, design, smallest};
 use rayon::prelude::*;
 
 use crate::{layout::Layout, models::Models};
@@ -92,7 +92,7 @@ pub fn authority(layout: &Layout, axes: &[DesignAxis<'_>], rate_hz: f64) -> Auth
     let largest = axes.iter().map(|axis| axis.scale.length).fold(0.0, f64::max);
     let fastest = axes.iter().map(|axis| axis.scale.length / axis.scale.time.powi(2)).fold(0.0, f64::max);
     let slowest = axes.iter().map(|axis| axis.scale.time).fold(0.0, f64::max);
-    let channels: Vec<u8> = axes.iter().filter_map(|axis| layout.axes[axis.place].desired[2]).take(4).collect();
+    let channels: Vec<u8> = axes.iter().filter_map(|axis| layout.axes[axis.place].desired[2]).take(MAX_AXES).collect();
     AuthorityDescription {
         channels,
         scale: (AUTHORITY[1] * fastest) as f32,
@@ -128,12 +128,7 @@ fn stored(
         fast_limit: (fast_limit * axis.scale.length) as f32,
         integral_limit: (INTEGRAL_LIMIT * axis.scale.length) as f32,
     };
-    let margins = designed.assessment.margins.as_ref().map_or(Margins::default(), |margins| Margins {
-        delay_ms: margins.delay_milliseconds.map_or(f32::MAX, |value| value as f32),
-        gain: margins.gain_up.map_or(f32::MAX, |value| value as f32),
-        modulus: margins.modulus as f32,
-    });
-    (lane, margins)
+    (lane, designed.margins())
 }
 
 /// All designs of the grid.
@@ -169,14 +164,9 @@ pub fn candidates(layout: &Layout, axes: &[DesignAxis<'_>]) -> Vec<Candidate> {
 
 /// A lane of these axes, with the smallest of their margins.
 pub fn lane_of(axes: &[(&LaneAxisDescription, Margins)], authority: AuthorityDescription) -> LaneDescription {
-    let worst = |of: fn(&Margins) -> f32| axes.iter().map(|(_, margins)| of(margins)).fold(f32::MAX, f32::min);
     LaneDescription {
         axes: axes.iter().map(|(lane, _)| (*lane).clone()).collect(),
         authority,
-        margins: Margins {
-            delay_ms: worst(|margins| margins.delay_ms),
-            gain: worst(|margins| margins.gain),
-            modulus: worst(|margins| margins.modulus),
-        },
+        margins: smallest(axes.iter().map(|(_, margins)| *margins)),
     }
 }

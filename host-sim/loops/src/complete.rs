@@ -3,6 +3,7 @@
 //! *in* logs that are ready and a way to make model files; *out* lane, monitor, predictions; *never* a lane that the logs kept
 //! apart have not judged; *source* `impromptu-training`, which does this for a simulated vehicle.
 
+use impromptu_diagnosis::prediction::root_mean_square;
 use impromptu_firmware::{Lanes, model::MAX_AXES};
 use impromptu_model_export::{
     ExportError,
@@ -16,7 +17,7 @@ use crate::{
     description::LoopDescription,
     design::{Chosen, Judge, NoLane},
     layout::Layout,
-    prepared::{Prepared, rms},
+    prepared::Prepared,
     reading::AxisSignals,
 };
 
@@ -123,7 +124,8 @@ pub fn complete(request: &Request<'_>) -> Result<Completed, ExportError> {
         pieces,
         encode: &|lane| encode(lane, None),
     };
-    let mut lanes = judge.choose(&axes, *draws)?;
+    let benches = judge.benches(&axes, *draws);
+    let mut lanes = judge.choose(&axes, &benches)?;
     only_the_best(&mut lanes);
     let found: Vec<&Chosen> = lanes.iter().filter_map(|lane| lane.as_ref().ok()).collect();
     let lane = (!found.is_empty()).then(|| {
@@ -131,8 +133,8 @@ pub fn complete(request: &Request<'_>) -> Result<Completed, ExportError> {
         lane_of(&parts, authority(&judged, &axes, prepared.model_hz))
     });
     let model = encode(lane.as_ref(), None)?;
-    let both = judge.predicted(&axes, *draws, &model, Lanes::BOTH)?;
-    let network = judge.predicted(&axes, 0, &model, Lanes { network: true, feedback: false })?;
+    let both = judge.predicted(&benches, &model, Lanes::BOTH)?;
+    let network = judge.predicted(&benches[..1], &model, Lanes { network: true, feedback: false })?;
     let monitor = monitor(request, validated_rms(&both, count) as f32);
     let fits = prepared.axes.iter().zip(lanes).enumerate().map(|(index, (axis, lane))| {
         let (flights, described) = (&both[index], &described.axes[axis.place]);
@@ -144,9 +146,9 @@ pub fn complete(request: &Request<'_>) -> Result<Completed, ExportError> {
             axis: described.name.clone(),
             unit: described.unit.clone(),
             time_constant_s: axis.time_constant_s,
-            error: rms(flights.iter().map(|[baseline, _]| *baseline)),
-            with_network: rms(network[index].iter().map(|[_, with]| *with)),
-            with_both: rms(flights.iter().map(|[_, with]| *with)),
+            error: root_mean_square(flights.iter().map(|[baseline, _]| *baseline)),
+            with_network: root_mean_square(network[index].iter().map(|[_, with]| *with)),
+            with_both: root_mean_square(flights.iter().map(|[_, with]| *with)),
             reduction_percent: interval(flights),
             lane,
             refusal,

@@ -144,6 +144,28 @@ fn own_frame() -> String {
     "its own".into()
 }
 
+impl AxisDescription {
+    /// An axis of these columns that is told positions and of which nothing else is known.
+    pub fn new(name: &str, unit: &str, reference: String, measured: String) -> Self {
+        Self {
+            name: name.into(),
+            unit: unit.into(),
+            frame: own_frame(),
+            accepts: Accepts::Position,
+            reference,
+            measured,
+            desired: None,
+            velocity: None,
+            reference_velocity: None,
+            desired_velocity: None,
+            fresh: None,
+            wrap: None,
+            cap: None,
+            cap_rate: None,
+        }
+    }
+}
+
 /// A loop.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Validate)]
 #[serde(deny_unknown_fields)]

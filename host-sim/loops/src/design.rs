@@ -5,6 +5,7 @@
 //! of the whole loop, with more or less gain; *source* `impromptu-training`, which chooses lanes for a simulated vehicle in
 //! the same cases.
 
+use impromptu_diagnosis::prediction::root_mean_square;
 use impromptu_firmware::{
     Lanes,
     model::{MAX_AXES, Margins, Model},
@@ -13,7 +14,10 @@ use impromptu_model_export::{
     ExportError,
     description::{AuthorityDescription, LaneAxisDescription, LaneDescription},
 };
-use impromptu_training::feedback_design::{ArxModel, DesignRefusal};
+use impromptu_training::{
+    feedback_design::{ArxModel, DesignRefusal},
+    lane::worst_to_answer_for,
+};
 use rayon::prelude::*;
 
 use crate::{
@@ -104,7 +108,7 @@ struct Score {
 
 impl Judge<'_> {
     /// Pieces on each set of models: the models themselves, then the draws.
-    fn benches<'m>(&'m self, axes: &'m [DesignAxis<'_>], draws: usize) -> Vec<Vec<Piece<'m>>> {
+    pub fn benches<'m>(&'m self, axes: &'m [DesignAxis<'_>], draws: usize) -> Vec<Vec<Piece<'m>>> {
         let sets = std::iter::once(None).chain((0..draws).map(Some));
         sets.map(|draw| {
             let model = |axis: &'m DesignAxis<'_>| -> &'m ArxModel {
@@ -138,12 +142,15 @@ impl Judge<'_> {
     ///
     /// # Errors
     /// If a model cannot be made.
-    pub fn choose(&self, axes: &[DesignAxis<'_>], draws: usize) -> Result<Vec<Result<Chosen, NoLane>>, ExportError> {
+    pub fn choose(
+        &self,
+        axes: &[DesignAxis<'_>],
+        benches: &[Vec<Piece<'_>>],
+    ) -> Result<Vec<Result<Chosen, NoLane>>, ExportError> {
         let candidates = candidates(self.layout, axes);
         let authority = authority(self.layout, axes, self.rate_hz);
         let slowest = axes.iter().map(|axis| axis.scale.time).fold(f64::INFINITY, f64::min);
         let cases = cases(self.rate_hz, slowest);
-        let benches = self.benches(axes, draws);
         let network = (self.encode)(None)?;
         // Of each bench and case the errors without anything, and with the network lane alone.
         let alone: Vec<Vec<[Vec<Vec<f64>>; 2]>> = benches
@@ -158,7 +165,7 @@ impl Judge<'_> {
             .collect::<Result<_, _>>()?;
         let scores: Vec<Vec<Option<Score>>> = candidates
             .par_iter()
-            .map(|candidate| self.scores(candidate, &authority, &cases, &benches, &alone))
+            .map(|candidate| self.scores(candidate, &authority, &cases, benches, &alone))
             .collect::<Result<_, _>>()?;
         Ok((0..axes.len()).map(|axis| best(&candidates, &scores, axis)).collect())
     }
@@ -190,7 +197,7 @@ impl Judge<'_> {
                         let of = |errors: &[Vec<f64>]| errors.iter().map(|errors| errors[*axis]).collect::<Vec<_>>();
                         let score = scores[*axis].get_or_insert(Score { mean: 0.0, worst: f64::INFINITY, case: "" });
                         // A model that swings by itself in this case is not this loop, or the loop is to blame.
-                        if rms(&of(baseline)) <= SWINGS * rms(&of(usual)) {
+                        if root_mean_square(of(baseline)) <= SWINGS * root_mean_square(of(usual)) {
                             score.add(*weight / benches.len() as f64, case.name, [&of(baseline), &of(network), &of(&errors)]);
                         }
                     }
@@ -204,14 +211,7 @@ impl Judge<'_> {
     ///
     /// # Errors
     /// If the model is refused.
-    pub fn predicted(
-        &self,
-        axes: &[DesignAxis<'_>],
-        draws: usize,
-        model: &[u8],
-        lanes: Lanes,
-    ) -> Result<Vec<Vec<[f64; 2]>>, ExportError> {
-        let benches = self.benches(axes, draws);
+    pub fn predicted(&self, benches: &[Vec<Piece<'_>>], model: &[u8], lanes: Lanes) -> Result<Vec<Vec<[f64; 2]>>, ExportError> {
         let flown: Vec<Vec<Vec<[f64; 2]>>> = benches
             .par_iter()
             .map(|bench| {
@@ -221,26 +221,21 @@ impl Judge<'_> {
                 Ok::<_, ExportError>(pairs.collect())
             })
             .collect::<Result<_, _>>()?;
-        Ok((0..axes.len()).map(|axis| flown.iter().flatten().map(|flight| flight[axis]).collect()).collect())
+        let axes = self.layout.axes.len();
+        Ok((0..axes).map(|axis| flown.iter().flatten().map(|flight| flight[axis]).collect()).collect())
     }
 }
 
 /// A loop without an add-on swings by itself in a case whose error is so many times that of the logs.
 const SWINGS: f64 = 1.5;
 
-fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
-}
-
 impl Score {
     /// Adds flights of one case: without anything, with the network lane alone, with both lanes.
     fn add(&mut self, weight: f64, case: &'static str, [baseline, network, errors]: [&[f64]; 3]) {
-        let flights = || baseline.iter().zip(network).zip(errors);
-        let logs: f64 = flights().map(|((baseline, _), error)| (error.max(1e-12) / baseline.max(1e-12)).ln()).sum();
+        let ratios = baseline.iter().zip(errors).map(|(baseline, error)| error.max(1e-12) / baseline.max(1e-12));
+        let logs = ratios.map(f64::ln).sum::<f64>();
         let mean = 100.0 * (1.0 - (logs / baseline.len().max(1) as f64).exp());
-        // A lane answers for the flights that the network lane alone can fly.
-        let answerable = flights().filter(|((baseline, network), _)| network <= baseline);
-        let worst = answerable.map(|((baseline, _), error)| 100.0 * (1.0 - error / baseline)).fold(100.0, f64::min);
+        let worst = worst_to_answer_for(baseline, network, errors);
         self.mean += weight * (0.9 * mean + 0.1 * worst);
         if worst < self.worst {
             (self.worst, self.case) = (worst, case);

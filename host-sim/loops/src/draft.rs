@@ -178,20 +178,13 @@ fn described(axis: &str, columns: &Found) -> Option<AxisDescription> {
         column(Some(Role::Reference), Kind::Velocity).or_else(|| column(Some(Role::Desired), Kind::Velocity));
     let unit = columns.iter().filter(|((_, kind), _)| *kind == Kind::Position).find_map(|(_, (_, unit))| *unit);
     Some(AxisDescription {
-        name: axis.into(),
-        unit: unit.unwrap_or("units").into(),
-        frame: "its own".into(),
         accepts: if reference_velocity.is_some() { Accepts::PositionVelocity } else { Accepts::Position },
-        reference,
-        measured: measured(Kind::Position)?,
         desired_velocity: desired.as_ref().and_then(|_| column(Some(Role::Desired), Kind::Velocity)),
         desired,
         velocity: measured(Kind::Velocity),
         reference_velocity,
         fresh: measured(Kind::Acceleration).map(|column| Fresh { column, kind: FreshKind::Acceleration }),
-        wrap: None,
-        cap: None,
-        cap_rate: None,
+        ..AxisDescription::new(axis, unit.unwrap_or("units"), reference, measured(Kind::Position)?)
     })
 }
 
@@ -204,20 +197,8 @@ pub fn stated(columns: &[String]) -> Option<AxisDescription> {
     };
     let Read { axis, unit, .. } = read(measured);
     Some(AxisDescription {
-        name: axis,
-        unit: unit.unwrap_or("units").into(),
-        frame: "its own".into(),
-        accepts: Accepts::Position,
-        reference: reference.clone(),
-        measured: measured.clone(),
-        desired: None,
         velocity,
-        reference_velocity: None,
-        desired_velocity: None,
-        fresh: None,
-        wrap: None,
-        cap: None,
-        cap_rate: None,
+        ..AxisDescription::new(&axis, unit.unwrap_or("units"), reference.clone(), measured.clone())
     })
 }
 

@@ -19,6 +19,15 @@ pub struct AxisChannels {
     pub reference: [Option<u8>; 3],
 }
 
+/// Writes values into channels; what an axis has no channel for is left out.
+pub fn write(into: &mut [f32; MAX_CHANNELS], channels: &[Option<u8>], values: &[f64]) {
+    for (channel, value) in channels.iter().zip(values) {
+        if let Some(channel) = channel {
+            into[usize::from(*channel)] = *value as f32;
+        }
+    }
+}
+
 /// Signals of a loop.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layout {

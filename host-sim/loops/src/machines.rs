@@ -16,8 +16,8 @@ use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::{
-    description::{Accepts, AxisDescription, Fresh, FreshKind, LoopDescription},
-    layout::{Layout, TooManyChannels},
+    description::{AxisDescription, Fresh, FreshKind, LoopDescription},
+    layout::{Layout, TooManyChannels, write},
     reading::{AxisLog, AxisSignals, slope},
     replay::{HostAddOn, host_add_on},
 };
@@ -153,20 +153,13 @@ impl Machine {
     pub fn description(self) -> LoopDescription {
         let plant = self.plant();
         let axes = plant.axes.iter().map(|name| AxisDescription {
-            name: (*name).into(),
-            unit: plant.unit.into(),
             frame: "its base".into(),
-            accepts: Accepts::Position,
-            reference: format!("{name}_reference"),
-            measured: format!("{name}_measured"),
             desired: Some(format!("{name}_desired")),
             velocity: Some(format!("{name}_velocity")),
-            reference_velocity: None,
-            desired_velocity: None,
             fresh: Some(Fresh { column: format!("{name}_acceleration"), kind: FreshKind::Acceleration }),
-            wrap: None,
             cap: Some(plant.far),
             cap_rate: Some(40.0 * plant.far),
+            ..AxisDescription::new(name, plant.unit, format!("{name}_reference"), format!("{name}_measured"))
         });
         let axes = axes.collect();
         LoopDescription { name: self.name().into(), time: "time_s".into(), rate_hz: Some(plant.rate_hz), age_ms: None, axes }
@@ -367,11 +360,7 @@ pub fn flown(
             while add_on.next_tick() <= tick as i32 + *ahead {
                 let at = (add_on.next_tick().max(0) as usize).min(ticks - 1);
                 for (axis, of_axis) in layout.axes.iter().enumerate() {
-                    for (channel, values) in of_axis.desired.iter().zip([&desired[axis], &velocities[axis]]) {
-                        if let Some(channel) = channel {
-                            channels[usize::from(*channel)] = values[at] as f32;
-                        }
-                    }
+                    write(&mut channels, &of_axis.desired, &[desired[axis][at], velocities[axis][at]]);
                 }
                 if add_on.push(channels).is_err() {
                     break;
@@ -379,11 +368,7 @@ pub fn flown(
             }
             let mut told = [0.0f32; MAX_CHANNELS];
             for (of_axis, measured) in layout.axes.iter().zip(&measured) {
-                for (channel, value) in of_axis.measured.iter().zip(measured) {
-                    if let Some(channel) = channel {
-                        told[usize::from(*channel)] = *value as f32;
-                    }
-                }
+                write(&mut told, &of_axis.measured, measured);
             }
             let found = add_on.step(tick as i32, &told, &mut scratch);
             for (reference, of_axis) in references.iter_mut().zip(&layout.axes) {

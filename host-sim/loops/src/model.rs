@@ -17,7 +17,7 @@ use crate::{
     layout::Layout,
     prepared::{PreparedAxis, Split},
     reading::AxisSignals,
-    window::Window,
+    window::{Window, relative},
 };
 
 /// Limits above the largest correction of the logs.
@@ -91,11 +91,8 @@ impl Maker<'_> {
         let shortest = self.axes.iter().flat_map(|axis| &axis.split.training).map(AxisSignals::len).min().unwrap_or(1);
         let rows = (0..shortest).step_by((shortest / ROWS).max(1)).map(|tick| {
             let of_axis = |(split, window): (&Split, &Window)| {
-                let values = &split.training[0].desired;
-                let last = values.len() as i32 - 1;
-                let value =
-                    |(offset, _): &(i32, f64)| (values[(tick as i32 + offset).clamp(0, last) as usize] - values[tick]) as f32;
-                window.weights.iter().map(value).collect::<Vec<_>>()
+                let offsets: Vec<i32> = window.weights.iter().map(|(offset, _)| *offset).collect();
+                relative(&split.training[0].desired, &offsets, tick).into_iter().map(|value| value as f32).collect::<Vec<_>>()
             };
             self.axes.iter().map(|axis| &axis.split).zip(self.windows).flat_map(of_axis).collect()
         });

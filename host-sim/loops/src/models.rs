@@ -26,7 +26,7 @@ pub struct Models {
 const PIECES: usize = 12;
 
 /// The signals as the identification reads them; without desired position nothing was dithered.
-pub fn axis_log(signals: &AxisSignals) -> AxisLog<'_> {
+fn axis_log(signals: &AxisSignals) -> AxisLog<'_> {
     AxisLog {
         measured_position: &signals.measured,
         measured_velocity: &signals.velocity,
@@ -108,6 +108,9 @@ impl Models {
         let all: Vec<AxisLog<'_>> = logs.iter().map(|signals| axis_log(signals)).collect();
         let data = IdentificationData::collect(&all, settings.margin_lags)?;
         let whole = data.fit(settings.margin_lags, [0.0; 2], settings.regularisation)?;
+        if draws == 0 {
+            return Ok(Self { data, whole, draws: Vec::new() });
+        }
         let ticks: usize = logs.iter().map(|signals| signals.len()).sum();
         let length = (ticks / PIECES).max(4 * settings.margin_lags);
         let pieces: Vec<AxisLog<'_>> = all.iter().flat_map(|log| cut(log, length)).collect();

@@ -3,6 +3,7 @@
 //! *in* logs, `[file][axis]`; *out* [`Prepared`] axes; *never* a log kept apart in what is fitted; *source* every fourth log is
 //! held out, as in `impromptu-training`.
 
+use impromptu_diagnosis::prediction::root_mean_square;
 use impromptu_training::{
     feedback_design::{DesignRefusal, DesignSettings},
     hold_out::held_out,
@@ -118,7 +119,7 @@ pub fn prepared(
     };
     let model_hz = rate_hz / divisor as f64;
     let mut splits: Vec<Split> = places.iter().map(|&place| split(&of_axis(place), divisor)).collect();
-    let errors: Vec<f64> = splits.iter().map(|split| rms(split.training.iter().map(AxisSignals::error))).collect();
+    let errors: Vec<f64> = splits.iter().map(|split| root_mean_square(split.training.iter().map(AxisSignals::error))).collect();
     // Axes of one unit are parts of one distance: the smallest of them is not to be corrected by its own small error.
     let distance = |unit: &str| {
         let of_unit = places.iter().zip(&errors).filter(|(place, _)| described.axes[**place].unit == unit);
@@ -150,16 +151,6 @@ pub fn prepared(
     let minutes =
         logs.iter().map(|axes| axes.first().map_or(0.0, |log| log.signals.len() as f64 / log.rate_hz)).sum::<f64>() / 60.0;
     Ok(Prepared { model_hz, divisor, axes, time_constants_s: [fastest, slowest], minutes })
-}
-
-/// Root of the mean square.
-pub fn rms(values: impl Iterator<Item = f64>) -> f64 {
-    let (mut sum, mut count) = (0.0, 0usize);
-    for value in values {
-        sum += value * value;
-        count += 1;
-    }
-    (sum / count.max(1) as f64).sqrt()
 }
 
 fn one_rate(logs: &[Vec<AxisLog>]) -> Result<f64, PrepareError> {
@@ -200,7 +191,7 @@ pub fn time_constant_s(logs: &[&AxisLog]) -> Result<f64, DesignRefusal> {
         let divisor = ((rate_hz * found_s / TICKS).floor() as usize).max(1);
         let signals: Vec<AxisSignals> = logs.iter().map(|log| log.signals.every(divisor)).collect();
         let model_hz = rate_hz / divisor as f64;
-        let scale = Scale::of(rms(signals.iter().map(AxisSignals::error)), found_s);
+        let scale = Scale::of(root_mean_square(signals.iter().map(AxisSignals::error)), found_s);
         let settings = scale.settings(model_hz, scale.time);
         let models = Models::of(&signals.iter().collect::<Vec<_>>(), &settings, 0, 0)?;
         // A model of too short a memory has no end: look longer.

@@ -5,7 +5,10 @@
 
 use std::path::Path;
 
-use impromptu_diagnosis::plausibility::{Columns, Reading, plausible};
+use impromptu_diagnosis::{
+    plausibility::{Columns, Reading, plausible},
+    prediction::root_mean_square,
+};
 use impromptu_sim::columns::{LARGEST, Table, TableError};
 use impromptu_training::channel::ChannelError;
 
@@ -86,8 +89,7 @@ impl AxisSignals {
 
     /// RMS of what was measured less what was desired.
     pub fn error(&self) -> f64 {
-        let squares = self.measured.iter().zip(&self.desired).map(|(y, r)| (y - r).powi(2)).sum::<f64>();
-        (squares / self.len().max(1) as f64).sqrt()
+        root_mean_square(self.measured.iter().zip(&self.desired).map(|(y, r)| y - r))
     }
 }
 

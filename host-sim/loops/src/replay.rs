@@ -16,7 +16,7 @@ use impromptu_firmware::{
 use impromptu_training::feedback_design::ArxModel;
 
 use crate::{
-    layout::Layout,
+    layout::{Layout, write},
     reading::{AxisSignals, at},
     response::ratio_of_gains,
 };
@@ -226,19 +226,12 @@ impl<'m, 'l> Flight<'m, 'l> {
         let at = tick.clamp(0, last) as usize;
         let mut desired = [0.0f32; MAX_CHANNELS];
         for (channels, signals) in self.layout.axes.iter().zip(&piece.signals) {
-            let [position, velocity, acceleration] = channels.desired;
-            let mut set = |channel: Option<u8>, value: f64| {
-                if let Some(channel) = channel {
-                    desired[usize::from(channel)] = value as f32;
-                }
-            };
-            set(position, signals.desired[at]);
             let moving = (0..=last).contains(&tick);
-            set(velocity, if moving { signals.desired_velocity[at] } else { 0.0 });
             let (before, after) = (at.saturating_sub(1), (at + 1).min(last as usize));
             let steps = (after - before).max(1) as f64;
             let slope = (signals.desired_velocity[after] - signals.desired_velocity[before]) * self.rate_hz / steps;
-            set(acceleration, if moving { slope } else { 0.0 });
+            let [velocity, acceleration] = if moving { [signals.desired_velocity[at], slope] } else { [0.0; 2] };
+            write(&mut desired, &channels.desired, &[signals.desired[at], velocity, acceleration]);
         }
         let _ = self.add_on.push(desired);
     }
@@ -254,11 +247,7 @@ impl<'m, 'l> Flight<'m, 'l> {
         }
         let mut measured = [0.0f32; MAX_CHANNELS];
         for (channels, seen) in self.layout.axes.iter().zip(seen) {
-            for (channel, value) in channels.measured.iter().zip(seen[tick.saturating_sub(delay)]) {
-                if let Some(channel) = channel {
-                    measured[usize::from(*channel)] = value as f32;
-                }
-            }
+            write(&mut measured, &channels.measured, &seen[tick.saturating_sub(delay)]);
         }
         let reference = self.add_on.step(tick as i32, &measured, &mut self.scratch);
         let desired = self.add_on.desired(tick as i32);

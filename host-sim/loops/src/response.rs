@@ -40,15 +40,15 @@ impl Answer {
 /// Share of a response's peak below which it has come to its end.
 const ENDED: f64 = 1e-3;
 /// Longest response that is looked at, ticks.
-pub const LONGEST: usize = 3000;
+const LONGEST: usize = 3000;
 /// Share of its end that a step response has reached after one time constant.
 const RISEN: f64 = 0.632;
 /// Ticks after which a velocity reference has led to where it leads.
 const SETTLED: usize = 1500;
 
-/// Response to a correction of one tick, to its end or `longest` ticks.
-pub fn response(model: &ArxModel, longest: usize) -> Vec<f64> {
-    let mut response = impulse_response(model, longest);
+/// Response to a correction of one tick, to its end or [`LONGEST`] ticks.
+fn response(model: &ArxModel) -> Vec<f64> {
+    let mut response = impulse_response(model, LONGEST);
     let peak = response.iter().fold(0.0f64, |peak, value| peak.max(value.abs()));
     let end = response.iter().rposition(|value| value.abs() > ENDED * peak).map_or(1, |last| last + 1);
     response.truncate(end);
@@ -58,7 +58,7 @@ pub fn response(model: &ArxModel, longest: usize) -> Vec<f64> {
 /// Ticks until the answer to a step of the position reference has come to 63 % of its end: the loop's time constant and dead
 /// time. `None` if it has no end.
 pub fn time_constant(model: &ArxModel) -> Option<f64> {
-    let response = response(model, LONGEST);
+    let response = response(model);
     let end = response.iter().sum::<f64>();
     let mut risen = 0.0;
     let tick = response.iter().position(|value| {

@@ -2,10 +2,9 @@
 //!
 //! *in* logs of an axis and a model of it; *out* weights of the window; *never* a correction learned from noise in its own
 //! inputs: these are the desired trajectory, which has none; *source* Zhou 2017, Insight 3 (difference learning): features
-//! relative to
-//! now. What differs: the paper learns the inverse with the measured output in the place of the desired one; here the error that
-//! was logged is regressed on what the window would have done to it through the identified loop (filtered-x, Widrow and Walach
-//! 1996), which needs no stable inverse and is not biased by measurement noise.
+//! relative to now. What differs: the paper learns the inverse with the measured output in the place of the desired one; here
+//! the error that was logged is regressed on what the window would have done to it through the identified loop (filtered-x,
+//! Widrow and Walach 1996), which needs no stable inverse and is not biased by measurement noise.
 
 use impromptu_diagnosis::{least_squares::Regression, record::decimated};
 
@@ -45,7 +44,7 @@ pub struct Window {
 }
 
 /// Rows of relative desired positions at a tick; the trajectory rests beyond its ends.
-fn relative(desired: &[f64], offsets: &[i32], tick: usize) -> Vec<f64> {
+pub fn relative(desired: &[f64], offsets: &[i32], tick: usize) -> Vec<f64> {
     let last = desired.len() as i32 - 1;
     offsets.iter().map(|offset| desired[(tick as i32 + offset).clamp(0, last) as usize] - desired[tick]).collect()
 }
@@ -100,7 +99,8 @@ pub fn fit(logs: &[&AxisSignals], answer: &Answer, offsets: &[i32], age_ticks: f
         });
         errors.sum::<f64>()
     };
-    let penalty = PENALTIES.into_iter().min_by(|a, b| missed(*a).total_cmp(&missed(*b)))?;
+    let tried = PENALTIES.map(|penalty| (penalty, missed(penalty)));
+    let (penalty, _) = tried.into_iter().min_by(|(_, a), (_, b)| a.total_cmp(b))?;
     let solution = joined(None).solve(penalty)?;
     let (constant, weights) = solution.coefficients.as_slice().split_last()?;
     let mut window = Window {

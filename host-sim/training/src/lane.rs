@@ -6,10 +6,7 @@
 //! is taken: average and worst flight of each of these cases, the nominal one counting most: what a user gets also when the
 //! vehicle is not quite the one that was identified.
 
-use impromptu_firmware::{
-    adapter::Lanes,
-    model::{Margins, Model},
-};
+use impromptu_firmware::{adapter::Lanes, model::Model};
 use impromptu_model_export::{
     ExportError,
     description::{AuthorityDescription, LaneAxisDescription, LaneDescription},
@@ -23,7 +20,7 @@ use impromptu_sim::{
 use rayon::prelude::*;
 
 use crate::{
-    feedback_design::{AxisLog, DesignSettings, IdentificationData, LaneDesign, design},
+    feedback_design::{AxisLog, DesignSettings, IdentificationData, LaneDesign, design, smallest},
     lane_choice::{LaneChoice, LaneRefusal},
     recipe::{LaneRecipe, Recipe},
     validation::Validation,
@@ -170,23 +167,7 @@ fn describe(designs: &[&LaneDesign; 3], fast_limit: f64, scale: f64, recipe: &La
         error_scale: recipe.error_scale as f32,
         decay: recipe.authority_decay as f32,
     };
-    LaneDescription { axes, authority, margins: worst_margins(designs) }
-}
-
-/// The smallest margins over the axes; zero where the longer model is unstable.
-fn worst_margins(designs: &[&LaneDesign; 3]) -> Margins {
-    let mut worst = Margins { delay_ms: f32::MAX, gain: f32::MAX, modulus: f32::MAX };
-    for design in designs {
-        let found = design.assessment.margins.as_ref().map_or(Margins::default(), |margins| Margins {
-            delay_ms: margins.delay_milliseconds.map_or(f32::MAX, |value| value as f32),
-            gain: margins.gain_up.map_or(f32::MAX, |value| value as f32),
-            modulus: margins.modulus as f32,
-        });
-        worst.delay_ms = worst.delay_ms.min(found.delay_ms);
-        worst.gain = worst.gain.min(found.gain);
-        worst.modulus = worst.modulus.min(found.modulus);
-    }
-    worst
+    LaneDescription { axes, authority, margins: smallest(designs.iter().map(|design| design.margins())) }
 }
 
 /// Collects dithered logs.
@@ -266,7 +247,7 @@ fn flown(
 }
 
 /// The worst reduction, per cent, among the flights in which the network lane alone is not worse than the baseline.
-fn worst_to_answer_for(baseline: &[f64], network_alone: &[f64], errors: &[f64]) -> f64 {
+pub fn worst_to_answer_for(baseline: &[f64], network_alone: &[f64], errors: &[f64]) -> f64 {
     let flights = baseline.iter().zip(network_alone).zip(errors);
     let answerable = flights.filter(|((baseline, alone), _)| alone <= baseline);
     answerable.map(|((baseline, _), error)| 100.0 * (1.0 - error / baseline)).fold(100.0, f64::min)

@@ -27,7 +27,7 @@ mod synthetic;
 #[cfg(test)]
 mod tests;
 
-use impromptu_firmware::model::MAX_LAGS;
+use impromptu_firmware::model::{MAX_LAGS, Margins};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -142,6 +142,27 @@ pub struct LaneDesign {
     pub assessment: LoopAssessment,
     /// Excitation of the logs.
     pub excitation: Excitation,
+}
+
+impl LaneDesign {
+    /// The margins as a model states them; zero where the longer model is unstable.
+    pub fn margins(&self) -> Margins {
+        self.assessment.margins.as_ref().map_or(Margins::default(), |margins| Margins {
+            delay_ms: margins.delay_milliseconds.map_or(f32::MAX, |value| value as f32),
+            gain: margins.gain_up.map_or(f32::MAX, |value| value as f32),
+            modulus: margins.modulus as f32,
+        })
+    }
+}
+
+/// The smallest of margins over axes.
+pub fn smallest(margins: impl IntoIterator<Item = Margins>) -> Margins {
+    let unlimited = Margins { delay_ms: f32::MAX, gain: f32::MAX, modulus: f32::MAX };
+    margins.into_iter().fold(unlimited, |least, found| Margins {
+        delay_ms: least.delay_ms.min(found.delay_ms),
+        gain: least.gain.min(found.gain),
+        modulus: least.modulus.min(found.modulus),
+    })
 }
 
 /// The firmware divides the integral's coefficient by 1 minus the sum of the past-output coefficients and refuses less.
