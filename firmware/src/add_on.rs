@@ -49,8 +49,8 @@ pub enum PushError {
         /// Index of the desired channel.
         channel: usize,
     },
-    /// As many samples as the preview keeps lie ahead of the last reference tick: one more would push out what is still to be
-    /// flown.
+    /// One more sample would push out what is still to be flown, or what the model will still look back at: of `N` samples
+    /// those of the past of [`Card::preview_span`](crate::model::Card::preview_span) stay behind, the others lie ahead.
     Full,
 }
 
@@ -199,8 +199,8 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
         if let Some(channel) = desired.iter().position(|value| !value.is_finite()) {
             return Err(PushError::NotFinite { channel });
         }
-        // The oldest sample goes: it must have been flown.
-        if self.preview.is_ahead_full(self.adapter.last_tick()) {
+        // The oldest sample goes: it must have been flown, and the model must have done with it.
+        if self.preview.is_ahead_full(self.adapter.last_tick(), self.adapter.behind()) {
             return Err(PushError::Full);
         }
         self.preview.push(desired);
@@ -332,6 +332,11 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
     /// States whether the loop moves the machine ([`Adapter::set_airborne`]).
     pub fn set_airborne(&mut self, airborne: bool) {
         self.adapter.set_airborne(airborne);
+    }
+
+    /// Reference ticks of the trajectory that the model looks back at from the one that is flown; 0 without a model.
+    pub fn behind(&self) -> i32 {
+        self.adapter.behind()
     }
 
     /// Adapter and trajectory, for whoever does more with them than a whole add-on does.

@@ -82,9 +82,11 @@ impl<const D: usize, const N: usize> Preview<D, N> {
         self.stored == N
     }
 
-    /// Whether the next sample pushes out one that is still to be flown after the tick `flown`; before the first, all are.
-    pub fn is_ahead_full(&self, flown: Option<i32>) -> bool {
-        self.is_full() && flown.is_none_or(|tick| self.oldest_tick().wrapping_sub(tick) >= 0)
+    /// Whether the next sample pushes out one that is still to be seen after the tick `flown`, by who looks as many ticks
+    /// `behind` the one that is flown; before the first, all are.
+    pub fn is_ahead_full(&self, flown: Option<i32>, behind: i32) -> bool {
+        let kept = 1 - behind.max(1);
+        self.is_full() && flown.is_none_or(|tick| self.oldest_tick().wrapping_sub(tick.wrapping_add(kept)) >= 0)
     }
 
     /// Whether nothing is stored.
@@ -231,6 +233,31 @@ mod tests {
             for tick in oldest..kept + more {
                 let tick = first.wrapping_add(tick);
                 prop_assert_eq!(truncated.sample(tick), fresh.sample(tick));
+            }
+        }
+
+        /// Whoever pushes as much as there is room for still finds, at every tick, all that is looked back at.
+        #[test]
+        fn what_is_looked_back_at_stays(
+            first in any::<i32>(), behind in 0i32..7, pushes in prop::collection::vec(0usize..12, 1..40)
+        ) {
+            let mut preview = filled(0);
+            preview.clear(first);
+            let (mut flown, mut pushed) = (None, 0);
+            for (now, count) in (0i32..).zip(pushes) {
+                for _ in 0..count {
+                    if preview.is_ahead_full(flown, behind) {
+                        // Not for nothing: all room ahead is used.
+                        prop_assert_eq!(pushed, (now + 8 - behind.max(1)).max(8));
+                        break;
+                    }
+                    preview.push([pushed as f32, 0.0]);
+                    pushed += 1;
+                }
+                for tick in (now - behind).max(0)..pushed {
+                    prop_assert_eq!(preview.sample(first.wrapping_add(tick))[0], tick as f32);
+                }
+                flown = Some(first.wrapping_add(now));
             }
         }
 

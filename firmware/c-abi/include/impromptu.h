@@ -150,7 +150,8 @@ enum impromptu_status
   IMPROMPTU_STATUS_BAD_SAMPLE = 30,
   // There is no desired trajectory: the tick was done, the loop holds what was desired last or where it is.
   IMPROMPTU_STATUS_NO_TRAJECTORY = 31,
-  // The preview is full: as many samples as it keeps lie ahead of the last reference tick.
+  // The preview is full: one more sample would push out what is still to be flown or looked back at. Push it after the next
+  // reference ticks.
   IMPROMPTU_STATUS_FULL = 32,
   // The vehicle brakes, or rests where it has braked: only impromptu_flight_replan goes on.
   IMPROMPTU_STATUS_BRAKING = 33,
@@ -630,7 +631,8 @@ impromptu_status impromptu_flight_attach(struct impromptu_flight *flight,
 
 // Appends the desired state of the next reference tick, as far ahead as impromptu_description.future says. One that is not
 // finite, or that no vehicle can be asked for, gives IMPROMPTU_STATUS_NOT_FINITE and is not stored: the next one is still that
-// of the same tick. After impromptu_flight_brake it gives IMPROMPTU_STATUS_BRAKING.
+// of the same tick. After impromptu_flight_brake it gives IMPROMPTU_STATUS_BRAKING; with so many ahead that the next one would
+// push out what is still to be flown, or looked back at, IMPROMPTU_STATUS_FULL.
 impromptu_status impromptu_flight_push(struct impromptu_flight *flight, const struct impromptu_setpoint *setpoint);
 
 // Replaces what is stored from reference tick `tick` on, which must not have been flown: `setpoint` is the new trajectory's

@@ -43,7 +43,8 @@ impl Stack {
     /// Appends the desired state of the next reference tick.
     ///
     /// # Errors
-    /// If a number is not finite, or no vehicle can be asked for it, or the vehicle brakes; then nothing is stored.
+    /// If a number is not finite, or no vehicle can be asked for it, or the vehicle brakes, or the preview is full; then nothing
+    /// is stored.
     pub fn push(&mut self, setpoint: &Setpoint) -> Result<(), Status> {
         let (setpoint, now) = (physical(setpoint)?, self.now());
         Ok(self.course.append(&mut self.flight, &now, &setpoint)?)
@@ -144,6 +145,7 @@ impl From<course::Refusal> for Status {
         match refusal {
             course::Refusal::Braking => Self::Braking,
             course::Refusal::Tick { .. } => Self::Tick,
+            course::Refusal::Full { .. } => Self::Full,
         }
     }
 }

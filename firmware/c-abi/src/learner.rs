@@ -64,7 +64,7 @@ impl Learning {
         if !desired.is_finite() {
             return Err(Status::NotFinite);
         }
-        if self.preview.is_ahead_full(self.last) {
+        if self.preview.is_ahead_full(self.last, BEHIND + 1) {
             return Err(Status::Full);
         }
         self.preview.push([desired]);

@@ -64,7 +64,8 @@ pub enum Status {
     BadSample = 30,
     /// There is no desired trajectory: the tick was done, the loop holds what was desired last or where it is.
     NoTrajectory = 31,
-    /// The preview is full: as many samples as it keeps lie ahead of the last reference tick.
+    /// The preview is full: one more sample would push out what is still to be flown or looked back at. Push it after the next
+    /// reference ticks.
     Full = 32,
     /// The vehicle brakes, or rests where it has braked: only impromptu_flight_replan goes on.
     Braking = 33,

@@ -37,6 +37,13 @@ pub struct Now {
     pub period: f32,
 }
 
+impl Now {
+    /// How many setpoints can be stored from this tick on. Before the first tick there is no past to keep.
+    fn room(&self, flight: &Flight<'_>) -> i32 {
+        if self.flown.is_some() { flight.room() } else { PREVIEW as i32 }
+    }
+}
+
 /// Why a setpoint was not taken. Nothing changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refusal {
@@ -47,13 +54,18 @@ pub enum Refusal {
         /// The next one that can be taken.
         expected: i32,
     },
+    /// The preview is full: one more would push out what is still to be flown or looked back at.
+    Full {
+        /// The tick that can be taken after the next reference tick.
+        expected: i32,
+    },
 }
 
 impl From<Refusal> for Reason {
     fn from(refusal: Refusal) -> Self {
         match refusal {
             Refusal::Braking => Self::Braking,
-            Refusal::Tick { expected } => Self::Setpoint { expected },
+            Refusal::Tick { expected } | Refusal::Full { expected } => Self::Setpoint { expected },
         }
     }
 }
@@ -112,8 +124,8 @@ impl Course {
             // A copy, or overtaken; but what is older than anything that can be stored is of a sender that started again.
             return if gap < -(PREVIEW as i32) { Err(Refusal::Tick { expected: next }) } else { Ok(()) };
         }
-        // What lies further ahead than the preview would push out the present.
-        if tick.wrapping_sub(now.tick) >= PREVIEW as i32 || (next == 0 && gap > 0) {
+        // What lies further ahead would push out the present, or what is still looked back at.
+        if tick.wrapping_sub(now.tick) >= now.room(flight) || (next == 0 && gap > 0) {
             return Err(Refusal::Tick { expected: next });
         }
         if let Some(flown) = now.flown
@@ -141,12 +153,16 @@ impl Course {
     /// Appends a sample of the desired trajectory for the tick after the last one, as it is.
     ///
     /// # Errors
-    /// While it brakes.
+    /// While it brakes, or if the preview is full.
     pub fn append(&mut self, flight: &mut Flight<'_>, now: &Now, setpoint: &Setpoint) -> Result<(), Refusal> {
         if self.braking() {
             return Err(Refusal::Braking);
         }
-        let seen = self.seen(flight.next_setpoint(), setpoint, now.period);
+        let next = flight.next_setpoint();
+        if next.wrapping_sub(now.tick) >= now.room(flight) {
+            return Err(Refusal::Full { expected: next });
+        }
+        let seen = self.seen(next, setpoint, now.period);
         self.push(flight, &seen);
         Ok(())
     }
@@ -158,7 +174,7 @@ impl Course {
     pub fn replan(&mut self, flight: &mut Flight<'_>, now: &Now, tick: i32, setpoint: &Setpoint) -> Result<(), Refusal> {
         let first = now.flown.map_or(0, |flown| flown.wrapping_add(1));
         let ahead = tick.wrapping_sub(first);
-        if ahead < 0 || tick.wrapping_sub(now.tick) >= PREVIEW as i32 || (flight.next_setpoint() == 0 && ahead > 0) {
+        if ahead < 0 || tick.wrapping_sub(now.tick) >= now.room(flight) || (flight.next_setpoint() == 0 && ahead > 0) {
             return Err(Refusal::Tick { expected: first });
         }
         let before = tick.wrapping_sub(1);

@@ -6,6 +6,7 @@
 mod clock;
 mod frozen;
 mod loops;
+mod trajectory;
 
 use core::num::NonZeroU32;
 
@@ -21,7 +22,7 @@ use crate::{
     caps,
     control::ThrustVector,
     quadrotor::{self, DESIRED, MEASURED, REFERENCE},
-    types::{MotorCommand, POSITION_LIMIT, Reference, Setpoint, State, Tick, within},
+    types::{MotorCommand, POSITION_LIMIT, Reference, State, Tick, within},
 };
 
 pub use crate::settings::{Rates, Settings};
@@ -170,41 +171,9 @@ impl<'m> Flight<'m> {
         self.stage.adapted.then(|| self.add_on.parts().0)
     }
 
-    /// Appends the desired state of the next reference tick; `false`, and nothing changes, if no vehicle can be asked for it
-    /// ([`Setpoint::is_physical`]): the next one is still that of the same tick.
-    pub fn push_setpoint(&mut self, setpoint: &Setpoint) -> bool {
-        let physical = setpoint.is_physical();
-        if physical {
-            self.add_on.parts().1.push(quadrotor::desired(setpoint));
-        }
-        physical
-    }
-
-    /// Reference tick of the next [`Flight::push_setpoint`].
-    pub fn next_setpoint(&self) -> i32 {
-        self.add_on.next_tick()
-    }
-
     /// The reference that the loop tracks now.
     pub fn reference(&self) -> &Reference {
         &self.reference
-    }
-
-    /// Forgets the desired trajectory: the next setpoint is that of this reference tick.
-    pub fn clear_setpoints(&mut self, tick: i32) {
-        self.add_on.clear(tick);
-    }
-
-    /// The desired state at a reference tick; beyond the trajectory's ends at rest there.
-    pub fn setpoint(&self, tick: i32) -> Setpoint {
-        let [px, py, pz, vx, vy, vz, ax, ay, az, yaw] = self.add_on.desired(tick);
-        let vector = Vector3::new;
-        Setpoint { position: vector(px, py, pz), velocity: vector(vx, vy, vz), acceleration: vector(ax, ay, az), yaw }
-    }
-
-    /// Forgets the desired trajectory from a reference tick on, of which the next setpoint then is. What is before it stays.
-    pub fn replace_setpoints(&mut self, from: i32) {
-        self.add_on.truncate(from);
     }
 
     /// Reference tick of a control tick.

@@ -13,6 +13,11 @@ use crate::{
 };
 
 impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
+    /// Reference ticks of the desired trajectory that the model looks back at from the one that is flown; 0 without a model.
+    pub fn behind(&self) -> i32 {
+        self.model.map_or(0, |_| self.behind)
+    }
+
     /// One reference tick with all that belongs to it: the reference that the loop shall track. `preview` should reach
     /// [`crate::format::Card::preview_span`]'s future ahead; what is missing is taken as the trajectory's end. The scratch needs
     /// [`crate::network::Network::scratch_words`].

@@ -156,3 +156,26 @@ fn clearing_keeps_the_fade_a_reset_the_wanted_lanes_and_a_restart_neither() {
     add_on.restart(-5);
     assert_eq!((weight(&mut add_on, -5), add_on.report()), (0.0, nothing(-4, 0)));
 }
+
+/// An application that pushes as far ahead as it may takes nothing from the model that it looks back at.
+#[test]
+fn a_push_that_would_cost_the_model_its_past_is_refused() {
+    let mut description = description(1);
+    description.features[0].offset = -9;
+    let bytes = constant_model(description.clone(), [0.25, 0.5]);
+    let model = Model::from_bytes(&bytes).unwrap();
+    let past = model.card().preview_span().0 as i32;
+    assert_eq!(past, 9 * i32::from(description.timing.divisor));
+    let mut add_on = Cart::new(&model, &table(&description), 100.0, &CAPS).unwrap();
+    let mut pushed = 0;
+    for tick in 0..300 {
+        while add_on.push([pushed as f32, 0.0]).is_ok() {
+            pushed += 1;
+        }
+        assert_eq!(add_on.push([0.0; 2]), Err(PushError::Full));
+        assert_eq!(pushed, (tick + CAPACITY as i32 - past).max(CAPACITY as i32));
+        let oldest = (tick - past).max(0);
+        assert_eq!(add_on.desired(oldest)[0], oldest as f32);
+        add_on.step(tick, &[tick as f32, 0.0], &mut Scratch::new());
+    }
+}

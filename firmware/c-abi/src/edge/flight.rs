@@ -56,7 +56,8 @@ pub unsafe extern "C" fn impromptu_flight_attach(
 
 /// Appends the desired state of the next reference tick, as far ahead as impromptu_description.future says. One that is not
 /// finite, or that no vehicle can be asked for, gives IMPROMPTU_STATUS_NOT_FINITE and is not stored: the next one is still that
-/// of the same tick. After impromptu_flight_brake it gives IMPROMPTU_STATUS_BRAKING.
+/// of the same tick. After impromptu_flight_brake it gives IMPROMPTU_STATUS_BRAKING; with so many ahead that the next one would
+/// push out what is still to be flown, or looked back at, IMPROMPTU_STATUS_FULL.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn impromptu_flight_push(flight: *mut FlightMemory, setpoint: *const Setpoint) -> Status {
     report(|| {

@@ -7,7 +7,11 @@ use nalgebra::{Quaternion, UnitQuaternion};
 use proptest::prelude::*;
 
 use super::*;
-use crate::settings::tests::{GOOD, numbers};
+use crate::{
+    course::{Course, Now, Refusal},
+    settings::tests::{GOOD, numbers},
+    types::Setpoint,
+};
 
 /// A number of any kind, in most draws a vehicle's.
 fn number() -> impl Strategy<Value = f32> {
@@ -131,6 +135,38 @@ proptest! {
         prop_assert_eq!(flight.next_setpoint(), kept);
         for tick in (kept - 30).max(0)..kept {
             prop_assert_eq!(flight.setpoint(tick), at(tick));
+        }
+    }
+
+    /// Who pushes as many as are taken finds the present, and of a course 32 more ticks that a learner looks back at.
+    #[test]
+    fn what_is_to_be_flown_is_never_pushed_out(burst in 1usize..400, ticks in 1i32..300, directly in any::<bool>()) {
+        let at = |tick: i32| Setpoint { position: Vector3::new(0.01 * tick as f32, 0.0, 1.0), ..Setpoint::ORIGIN };
+        let (mut flight, mut course) = (Flight::new(&GOOD).unwrap(), Course::NONE);
+        let every = GOOD.rates.position_divisor;
+        for tick in 0..ticks {
+            let now = Now { tick, flown: (tick > 0).then(|| tick - 1), period: 0.01 };
+            for _ in 0..burst {
+                let next = flight.next_setpoint();
+                let taken = if directly {
+                    flight.push_setpoint(&at(next))
+                } else {
+                    match course.append(&mut flight, &now, &at(next)) {
+                        Ok(()) => true,
+                        Err(Refusal::Full { expected }) => {
+                            prop_assert_eq!(expected, next);
+                            false
+                        }
+                        Err(other) => panic!("{other:?}"),
+                    }
+                };
+                prop_assert_eq!(flight.next_setpoint(), next + i32::from(taken));
+            }
+            let behind = if directly { 0 } else { 32 };
+            for flown in (tick - behind).max(0)..=tick.min(flight.next_setpoint() - 1) {
+                prop_assert_eq!(flight.setpoint(flown), at(flown));
+            }
+            flight.control(Tick(tick as u32 * every), &State::ORIGIN);
         }
     }
 }

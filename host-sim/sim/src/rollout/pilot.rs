@@ -54,7 +54,9 @@ impl<'a, S: FlightStack> Pilot<'a, S> {
         }
         let ticks = |seconds: f64| (seconds / tick).round() as usize;
         let mut recorder = plan.record.then(|| Recorder::new(settings, plan.model));
-        for sample in plan.trajectory.samples.iter().take(PREVIEW / 2 + PREVIEW / 4) {
+        // As much of the past as the model looks back at has to stay.
+        let past = plan.model.map_or(0, |(model, _)| model.card().preview_span().0 as usize);
+        for sample in plan.trajectory.samples.iter().take((PREVIEW / 2 + PREVIEW / 4).min(PREVIEW.saturating_sub(past))) {
             let setpoint = setpoint(sample);
             stack.push_setpoint(&setpoint);
             recorder.iter_mut().for_each(|recorder| recorder.setpoint(&setpoint));
