@@ -1,6 +1,7 @@
 //! The C face: its header is up to date, strict compilers accept it, C programs get the bits of Rust, and no call does harm.
 
 mod learner;
+mod symbols;
 
 use std::{
     env, fs,

@@ -698,6 +698,14 @@ impromptu_status impromptu_learner_push(struct impromptu_learner *learner, float
 // stays.
 impromptu_status impromptu_learner_restart(struct impromptu_learner *learner, int32_t first_tick);
 
+// Forgets what is desired at reference tick `from` and later, for another trajectory from there on: the next sample pushed is
+// that of `from`, if as many had been pushed. What lies before stays.
+impromptu_status impromptu_learner_replan(struct impromptu_learner *learner, int32_t from);
+
+// States what a correction may be from the next step on, within the limits: for a loop of which it is known how far the desired
+// motion may need one. The limits if it is not said; what is not a number is refused.
+impromptu_status impromptu_learner_bound(struct impromptu_learner *learner, float low, float high);
+
 // States, before a step, what another feedback corrected of this axis in the last tick, as a model's feedback lane
 // (impromptu_adapter_fed_back): what that resists is not still missing. Measure the response without it.
 impromptu_status impromptu_learner_tell_other(struct impromptu_learner *learner, float correction);
