@@ -67,8 +67,15 @@
 #define IMPROMPTU_FLIGHT_WORDS 2096
 #endif
 
+#if defined(IMPROMPTU_POINTER_64)
 // Words of 8 bytes of an impromptu_learner.
 #define IMPROMPTU_LEARNER_WORDS 480
+#endif
+
+#if defined(IMPROMPTU_POINTER_32)
+// Words of 8 bytes of an impromptu_learner.
+#define IMPROMPTU_LEARNER_WORDS 448
+#endif
 
 // Words of 8 bytes of an impromptu_scratch.
 #define IMPROMPTU_SCRATCH_WORDS 257

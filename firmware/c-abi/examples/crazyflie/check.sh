@@ -7,7 +7,7 @@ folder=$1
 shift
 elf=$(ls -t "$folder"/*.elf 2> /dev/null | head -n 1)
 [ -n "$elf" ] || { echo "check.sh: there is no firmware in $folder" >&2; exit 1; }
-symbols=$("${CROSS_COMPILE:-arm-none-eabi-}nm" "$elf")
+symbols=$("${CROSS_COMPILE-arm-none-eabi-}nm" "$elf")
 for name in "$@"; do
     case $symbols in
         *" T __wrap_$name"*) ;;

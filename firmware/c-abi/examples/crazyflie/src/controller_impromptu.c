@@ -207,15 +207,17 @@ bool controllerOutOfTreeTest(void)
   return controllerPidTest() && controllerMellingerFirmwareTest();
 }
 
-/* In the place of the commander's set-point the corrected one, where there is something to correct: else not a bit of it. */
+/* The commander's set-point with what is added: else not a bit of it, not even by an addition of zero. */
 static void correct(setpoint_t *corrected)
 {
-  corrected->position.x += added[0];
-  corrected->position.y += added[1];
-  corrected->position.z += added[2];
-  corrected->velocity.x += added[3];
-  corrected->velocity.y += added[4];
-  corrected->velocity.z += added[5];
+  float *const places[REFERENCE] = {&corrected->position.x, &corrected->position.y, &corrected->position.z,
+                                    &corrected->velocity.x, &corrected->velocity.y, &corrected->velocity.z};
+
+  for (int i = 0; i < REFERENCE; i++) {
+    if (added[i] != 0.0f) {
+      *places[i] += added[i];
+    }
+  }
 }
 
 /* Two signs of 0.16 s and of 0.44 s a step, so that both axes and the height are told apart. */
