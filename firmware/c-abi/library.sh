@@ -31,7 +31,8 @@ output=${output:-$built/$target/impromptu/libimpromptu.a}
 archive=$built/$target/firmware/libimpromptu.a
 
 programs=$(rustc --print sysroot)/lib/rustlib/$host/bin
-[ -x "$programs/rust-lld" ] || fail "$programs/rust-lld is missing; run: rustup toolchain install $(rustc -vV | sed -n 's/^release: //p')"
+release=$(rustc -vV | sed -n 's/^release: //p')
+[ -x "$programs/rust-lld" ] || fail "$programs/rust-lld is missing; run: rustup toolchain install $release"
 # Not all of rustc's packages find their own shared libraries.
 export LD_LIBRARY_PATH="$(rustc --print sysroot)/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
 objcopy=
@@ -55,7 +56,8 @@ case $output in
     *)
         # An archive of one object: what a linker takes, with the index that makes it look into it.
         rm -f "$output"
-        "${AR:-ar}" rcs "$output" "$work/impromptu.o" 2> "$work/said" || fail "${AR:-ar} failed ($(cat "$work/said")); run: sudo apt-get install binutils"
+        command -v "${AR:-ar}" > /dev/null || fail "${AR:-ar} is not installed; run: sudo apt-get install binutils"
+        "${AR:-ar}" rcs "$output" "$work/impromptu.o"
         ;;
 esac
 echo "$output"

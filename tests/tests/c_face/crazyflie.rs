@@ -37,7 +37,8 @@ fn fly(name: &str, count: u32, watched: &[&str]) -> serde_json::Value {
     let flags: Vec<&str> =
         own.iter().map(String::as_str).chain([&*flights, "-Wl,--wrap=plan_is_disabled"]).chain(watched.iter().copied()).collect();
     let paths = ["plan.c", "work.c"].map(|source| example().join("src").join(source).to_str().unwrap().to_owned());
-    let sources = [&["crazyflie.c", "crazyflie-firmware/firmware.c", "crazyflie-firmware/planner.c"][..], &[&paths[0], &paths[1]]];
+    let sources =
+        [&["crazyflie.c", "crazyflie-firmware/firmware.c", "crazyflie-firmware/planner.c"][..], &[&paths[0], &paths[1]]];
     let program = Machine::Host.program(&folder, &flags, &sources.concat()).unwrap();
     let report = Machine::Host.run(&program, &folder, TIMEOUT).unwrap();
     println!("{report}");
@@ -78,7 +79,9 @@ fn objects(folder: &Path) -> Vec<PathBuf> {
     let compile = |source: &str| {
         let object = folder.join(source).with_extension("o");
         let mut compiler = Machine::Board.compiler();
-        compiler.args(["-Os", "-Werror", "-Wall", "-Wdouble-promotion", "-mfp16-format=ieee", "-fstack-usage", "-c"]).args(flags());
+        compiler
+            .args(["-Os", "-Werror", "-Wall", "-Wdouble-promotion", "-mfp16-format=ieee", "-fstack-usage", "-c"])
+            .args(flags());
         c::finished(compiler.arg("-I").arg(c::include()).arg(example().join("src").join(source)).arg("-o").arg(&object)).unwrap();
         object
     };
@@ -110,7 +113,8 @@ fn the_crazyflies_statics_and_the_stabilizers_stack_are_as_small_as_its_page_say
     let page = fs::read_to_string(example().join("README.md")).unwrap();
     assert!(page.contains(&format!("{statics} bytes of statics")), "README.md of the example: it has {statics} bytes of statics");
     // All of what the stabilizer task runs of ours: none of it calls the library.
-    let names = ["controllerOutOfTree", "exchange", "is_to_correct", "plan_is", "plan_copy", "measure", "add", "correct", "shake"];
+    let names =
+        ["controllerOutOfTree", "exchange", "is_to_correct", "plan_is", "plan_copy", "measure", "add", "correct", "shake"];
     let deepest: u64 = names.iter().filter_map(|name| frames.get(*name)).sum();
     assert!(deepest > 0 && deepest <= 500, "{deepest} bytes of the stabilizer's stack");
 }
@@ -125,10 +129,20 @@ fn a_firmware_whose_commander_does_not_call_what_is_wrapped_is_refused() {
         let text = format!("#include \"planner.h\"\nint main(void);\nint main(void) {{ return {call}; }}\n");
         fs::write(&source, text).unwrap();
         let mut compiler = Machine::Host.compiler();
-        compiler.args(flags()).arg("-I").arg(c::include()).args(["-ffunction-sections", "-Wl,--gc-sections", "-Wl,--wrap=plan_is_disabled"]);
+        compiler.args(flags()).arg("-I").arg(c::include()).args([
+            "-ffunction-sections",
+            "-Wl,--gc-sections",
+            "-Wl,--wrap=plan_is_disabled",
+        ]);
         let plan = example().join("src/plan.c");
         let stand_in = c::programs().join("crazyflie-firmware/firmware.c");
-        compiler.arg(&source).arg(plan).arg(c::programs().join("crazyflie-firmware/planner.c")).arg(stand_in).arg("-I").arg(c::programs());
+        compiler
+            .arg(&source)
+            .arg(plan)
+            .arg(c::programs().join("crazyflie-firmware/planner.c"))
+            .arg(stand_in)
+            .arg("-I")
+            .arg(c::programs());
         c::finished(compiler.args(["-lm", "-o"]).arg(&elf)).unwrap();
         Command::new(example().join("check.sh")).arg(&folder).arg("plan_is_disabled").env("CROSS_COMPILE", "").output().unwrap()
     };
