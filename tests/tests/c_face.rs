@@ -280,6 +280,7 @@ fn calls_from_c_need_no_more_stack_than_the_header_says() {
         let comment = &header[header[..prototype].rfind("\n\n").unwrap()..prototype];
         assert!(comment.contains(&format!("{kilobytes} KB of stack")), "{call}: {comment}");
     }
+    crazyflie::its_app_task_has_room(used["learner_create"].as_u64().unwrap());
     for (call, bytes) in &used {
         let limit = match call.as_str() {
             "model_create" | "flight_control" | "adapter_create" | "flight_attach" | "learner_keep" => 4_096,

@@ -29,6 +29,16 @@ fn flags() -> Vec<String> {
     names.into_iter().chain(folders).collect()
 }
 
+/// What its app task calls with the most on the stack is the creation of learners, in frames of its own and beside what an
+/// interrupt puts there.
+pub(crate) fn its_app_task_has_room(call: u64) {
+    let config = fs::read_to_string(example().join("app-config")).unwrap();
+    let words = config.lines().find_map(|line| line.strip_prefix("CONFIG_APP_STACKSIZE=")).unwrap();
+    assert!(4 * words.parse::<u64>().unwrap() >= call + 600, "{words} words, and {call} bytes are needed");
+    let page = fs::read_to_string(example().join("README.md")).unwrap();
+    assert!(page.contains(&format!("App stack: {words} words")), "README.md of the example: {words} words");
+}
+
 /// Builds the flights, `count` of them, with more flags for the compiler; gives what they say.
 fn fly(name: &str, count: u32, watched: &[&str]) -> serde_json::Value {
     let folder = folder(name);
