@@ -66,8 +66,7 @@ pub unsafe extern "C" fn impromptu_learner_bound(learner: *mut LearnerMemory, lo
     report(|| {
         // SAFETY: the module's rules.
         let learning = unsafe { object::<Learning>(learner)? };
-        // Written so that NaN is refused.
-        if !(low <= high) {
+        if low.is_nan() || high.is_nan() || low > high {
             return Err(Status::NotFinite);
         }
         learning.add_on.bound(0, low, high);
