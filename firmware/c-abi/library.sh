@@ -34,7 +34,8 @@ programs=$(rustc --print sysroot)/lib/rustlib/$host/bin
 release=$(rustc -vV | sed -n 's/^release: //p')
 [ -x "$programs/rust-lld" ] || fail "$programs/rust-lld is missing; run: rustup toolchain install $release"
 # Not all of rustc's packages find their own shared libraries.
-export LD_LIBRARY_PATH="$(rustc --print sysroot)/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
+LD_LIBRARY_PATH="$(rustc --print sysroot)/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
+export LD_LIBRARY_PATH
 objcopy=
 for candidate in "$programs/rust-objcopy" llvm-objcopy; do
     "$candidate" --version > /dev/null 2>&1 && objcopy=$candidate && break

@@ -5,6 +5,7 @@
 set -eu
 folder=$1
 shift
+# shellcheck disable=SC2012 # names of our own make file
 elf=$(ls -t "$folder"/*.elf 2> /dev/null | head -n 1)
 [ -n "$elf" ] || { echo "check.sh: there is no firmware in $folder" >&2; exit 1; }
 symbols=$("${CROSS_COMPILE-arm-none-eabi-}nm" "$elf")
