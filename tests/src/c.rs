@@ -46,23 +46,20 @@ impl Machine {
         }
     }
 
-    /// Builds the library as it is shipped.
+    /// Its name, as rustc's; `None` is this machine.
+    pub fn target(self) -> Option<&'static str> {
+        match self {
+            Self::Host => None,
+            Self::Board => Some(TARGET),
+        }
+    }
+
+    /// Makes the library as it is shipped, by the documented command.
     pub fn library(self) -> Result<PathBuf> {
-        let folder = target_folder();
-        fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
-        let lock = File::create(folder.join("emulator.lock"))?;
-        lock.lock()?;
-        let mut cargo = tool("cargo");
-        cargo.args(["build", "--package", "impromptu-c-abi", "--profile", "firmware", "--locked", "--target-dir"]).arg(&folder);
-        let mut built = folder.clone();
         if self == Self::Board {
             require_target()?;
-            cargo.args(["--target", TARGET]);
-            built.push(TARGET);
         }
-        let output = cargo.output().context("cannot start cargo")?;
-        ensure!(output.status.success(), "the library does not build:\n{}", String::from_utf8_lossy(&output.stderr));
-        Ok(built.join("firmware/libimpromptu.a"))
+        library(self.target(), None)
     }
 
     /// Compiles and links `sources` (below `tests/c`) with the library to `folder/program`.
@@ -100,6 +97,23 @@ impl Machine {
         ensure!(output.status.success(), "the program failed ({}):\n{}", output.status, text(&output.stderr));
         Ok(text(&output.stdout))
     }
+}
+
+/// Runs `library.sh` for a target, or this machine; gives the path of what it made: of the library, if no place is named.
+pub fn library(target: Option<&str>, place: Option<&Path>) -> Result<PathBuf> {
+    let folder = target_folder();
+    fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
+    let lock = File::create(folder.join("emulator.lock"))?;
+    lock.lock()?;
+    let mut script = Command::new(crate_folder().join("library.sh"));
+    for (variable, value) in tool("cargo").get_envs() {
+        match value {
+            Some(value) => script.env(variable, value),
+            None => script.env_remove(variable),
+        };
+    }
+    let output = finished(script.arg(target.unwrap_or_default()).args(place).env("CARGO_TARGET_DIR", &folder))?;
+    Ok(PathBuf::from(String::from_utf8(output.stdout)?.trim_end()))
 }
 
 /// The flags with which a program of this machine watches its memory, found out with a small one in `folder`. Without them the

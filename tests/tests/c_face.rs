@@ -1,6 +1,8 @@
 //! The C face: its header is up to date, strict compilers accept it, C programs get the bits of Rust, and no call does harm.
 
+mod crazyflie;
 mod learner;
+mod symbols;
 
 use std::{
     env, fs,
@@ -254,61 +256,6 @@ fn model_source(folder: &Path, file: &[u8]) -> PathBuf {
     source
 }
 
-#[test]
-fn the_crazyflie_controller_corrects_setpoints_and_converts_degrees_and_pitch() {
-    let file = model::file(&model::TANH, Precision::Int8);
-    let folder = folder("c-crazyflie");
-    let source = model_source(&folder, &file);
-    let example = c::crate_folder().join("examples/crazyflie/src");
-    let interface = c::programs().join("crazyflie-interface");
-    let includes = [&example, &interface].map(|path| format!("-I{}", path.display()));
-    // As the Crazyflie's firmware is compiled; bits are compared, so products are rounded before they are added.
-    let flags = ["-std=gnu11", "-fno-math-errno", "-mfp16-format=ieee", "-ffp-contract=off", &includes[0], &includes[1]];
-    let program = Machine::Board.program(&folder, &flags, &["crazyflie.c", source.to_str().unwrap()]).unwrap();
-    let report = Machine::Board.run(&program, &folder, TIMEOUT).unwrap();
-    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
-    let answers: Vec<f32> =
-        fs::read(folder.join("answers.bin")).unwrap().as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
-    let (told, measured) = answers.split_at(answers.len() - MEASURED);
-
-    // Rolled to the right, nose up, turned to the right; rates about right-handed axes.
-    let radians = |degrees: f32| degrees * (std::f32::consts::PI / 180.0);
-    let angles = [20.0, -10.0, -30.0].map(radians);
-    let rates = [90.0, -45.0, 180.0].map(radians);
-    assert_eq!(measured[..6], [0.01, 0.02, 1.03, 0.4, -0.2, 0.1]);
-    assert_eq!((&measured[6..9], &measured[9..12], measured[12]), (&angles[..], &rates[..], 0.5 * 9.81));
-
-    // The same line through an adapter in Rust.
-    let model = Model::from_bytes(&file).unwrap();
-    let mut adapter = Adapter::<DESIRED, MEASURED, REFERENCE>::new(&model, quadrotor::signals(), 100.0, &CAPS, PREVIEW).unwrap();
-    adapter.defer();
-    adapter.switch(Lanes::BOTH);
-    let mut preview = Preview::<DESIRED, PREVIEW>::new(quadrotor::END_RULES, 0);
-    let line = |tick: i32| {
-        let time = (tick as f32 / 100.0).min(2.0);
-        let (starts, time) = if time > 1.0 { ([0.5, -0.25, 1.125, 0.5], time - 1.0) } else { ([0.0, 0.0, 1.0, 0.0], time) };
-        let speeds = [0.5, -0.25, 0.125, 0.5];
-        let at: [f32; 4] = std::array::from_fn(|axis| starts[axis] + speeds[axis] * time);
-        let moves = if tick > 200 { 0.0 } else { 1.0 };
-        let [vx, vy, vz, _] = speeds.map(|speed| speed * moves);
-        [at[0], at[1], at[2], vx, vy, vz, 0.0, 0.0, 0.0, at[3]]
-    };
-    let future = model.card().preview_span().1 as i32;
-    (0..=future).for_each(|tick| preview.push(line(tick)));
-    let (mut scratch, mut moved) = (Scratch::new(), false);
-    let ticks = told.as_chunks::<7>().0;
-    assert!(ticks.len() > 270 && report["ticks"] == ticks.len(), "{report}");
-    let measured: [f32; MEASURED] = measured.try_into().unwrap();
-    for (tick, told) in (0..).zip(ticks) {
-        preview.push(line(tick + future + 1));
-        let reference = adapter.step(tick, &preview, &measured, &mut scratch);
-        assert_eq!(told[..6].iter().map(|x| x.to_bits()).collect::<Vec<_>>(), reference.map(f32::to_bits), "tick {tick}");
-        assert!((told[6].to_radians() - line(tick)[9]).abs() < 1e-5);
-        moved |= (reference[0] - line(tick)[0]).abs() > 0.01;
-    }
-    assert!(moved && adapter.late() == 0, "the correction was flown");
-}
-
 /// Bytes of stack that each call may need on the microcontroller; the header and the Crazyflie's example tell these.
 #[test]
 fn calls_from_c_need_no_more_stack_than_the_header_says() {
@@ -333,6 +280,7 @@ fn calls_from_c_need_no_more_stack_than_the_header_says() {
         let comment = &header[header[..prototype].rfind("\n\n").unwrap()..prototype];
         assert!(comment.contains(&format!("{kilobytes} KB of stack")), "{call}: {comment}");
     }
+    crazyflie::its_app_task_has_room(used["learner_create"].as_u64().unwrap());
     for (call, bytes) in &used {
         let limit = match call.as_str() {
             "model_create" | "flight_control" | "adapter_create" | "flight_attach" | "learner_keep" => 4_096,

@@ -67,8 +67,15 @@
 #define IMPROMPTU_FLIGHT_WORDS 2096
 #endif
 
+#if defined(IMPROMPTU_POINTER_64)
 // Words of 8 bytes of an impromptu_learner.
 #define IMPROMPTU_LEARNER_WORDS 480
+#endif
+
+#if defined(IMPROMPTU_POINTER_32)
+// Words of 8 bytes of an impromptu_learner.
+#define IMPROMPTU_LEARNER_WORDS 448
+#endif
 
 // Words of 8 bytes of an impromptu_scratch.
 #define IMPROMPTU_SCRATCH_WORDS 257
@@ -699,6 +706,14 @@ impromptu_status impromptu_learner_push(struct impromptu_learner *learner, float
 // Forgets the trajectory, for another one: the next sample pushed will be that of reference tick `first_tick`. What was learned
 // stays.
 impromptu_status impromptu_learner_restart(struct impromptu_learner *learner, int32_t first_tick);
+
+// Forgets what is desired at reference tick `from` and later, for another trajectory from there on: the next sample pushed is
+// that of `from`, if as many had been pushed. What lies before stays.
+impromptu_status impromptu_learner_replan(struct impromptu_learner *learner, int32_t from);
+
+// States what a correction may be from the next step on, within the limits: for a loop of which it is known how far the desired
+// motion may need one. The limits if it is not said; what is not a number is refused.
+impromptu_status impromptu_learner_bound(struct impromptu_learner *learner, float low, float high);
 
 // States, before a step, what another feedback corrected of this axis in the last tick, as a model's feedback lane
 // (impromptu_adapter_fed_back): what that resists is not still missing. Measure the response without it.

@@ -76,6 +76,11 @@ impl Learning {
         self.preview.clear(first_tick);
     }
 
+    /// Forgets what is desired at this tick and later.
+    pub fn truncate(&mut self, from: i32) {
+        self.preview.truncate(from);
+    }
+
     /// A tick: the correction, and what was missing.
     pub fn step(&mut self, tick: i32, measured: f32, rate: f32, moving: bool) -> (f32, Result<(), Status>) {
         self.last = Some(tick);

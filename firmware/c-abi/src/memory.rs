@@ -26,7 +26,11 @@ pub const FLIGHT_WORDS: usize = 2096;
 #[cfg(target_pointer_width = "32")]
 pub const FLIGHT_WORDS: usize = 2096;
 /// Words of 8 bytes of an impromptu_learner.
+#[cfg(target_pointer_width = "64")]
 pub const LEARNER_WORDS: usize = 480;
+/// Words of 8 bytes of an impromptu_learner.
+#[cfg(target_pointer_width = "32")]
+pub const LEARNER_WORDS: usize = 448;
 /// Words of 8 bytes of an impromptu_scratch.
 pub const SCRATCH_WORDS: usize = 257;
 

@@ -3,6 +3,7 @@
 #include <stdint.h>
 #define PARAM_UINT8 0x08
 #define PARAM_INT32 0x02
+#define PARAM_FLOAT 0x06
 #define PARAM_RONLY (1 << 6)
 struct param_s {
   uint8_t type;

@@ -10,6 +10,7 @@ struct vec3_s { uint32_t timestamp; float x, y, z; };
 typedef struct vec3_s point_t;
 typedef struct vec3_s velocity_t;
 typedef struct vec3_s acc_t;
+typedef struct vec3_s jerk_t;
 typedef struct { float x, y, z, w; } quaternion_t;
 typedef struct {
   Axis3f acc;  /* Gs */
@@ -34,6 +35,7 @@ typedef struct {
   point_t position;
   velocity_t velocity;
   acc_t acceleration;
+  jerk_t jerk;
   bool velocity_body;
   setpoint_mode_t mode;
 } setpoint_t;

@@ -48,6 +48,32 @@ pub unsafe extern "C" fn impromptu_learner_restart(learner: *mut LearnerMemory, 
     })
 }
 
+/// Forgets what is desired at reference tick `from` and later, for another trajectory from there on: the next sample pushed is
+/// that of `from`, if as many had been pushed. What lies before stays.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_learner_replan(learner: *mut LearnerMemory, from: i32) -> Status {
+    report(|| {
+        // SAFETY: the module's rules.
+        unsafe { object::<Learning>(learner)?.truncate(from) };
+        Ok(())
+    })
+}
+
+/// States what a correction may be from the next step on, within the limits: for a loop of which it is known how far the desired
+/// motion may need one. The limits if it is not said; what is not a number is refused.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn impromptu_learner_bound(learner: *mut LearnerMemory, low: f32, high: f32) -> Status {
+    report(|| {
+        // SAFETY: the module's rules.
+        let learning = unsafe { object::<Learning>(learner)? };
+        if low.is_nan() || high.is_nan() || low > high {
+            return Err(Status::NotFinite);
+        }
+        learning.add_on.bound(0, low, high);
+        Ok(())
+    })
+}
+
 /// States, before a step, what another feedback corrected of this axis in the last tick, as a model's feedback lane
 /// (impromptu_adapter_fed_back): what that resists is not still missing. Measure the response without it.
 #[unsafe(no_mangle)]

@@ -1,0 +1,3 @@
+/* The part of the Crazyflie firmware's interface that the example uses, in its documented names: enough to compile and test against. */
+#pragma once
+#define STABILIZER_TASK_STACKSIZE (3 * 150)
