@@ -34,9 +34,9 @@ pub const KEPT: usize = 848;
 pub const PREVIEW: usize = 192;
 
 const _: () = assert!(
-    MAX_CHANNELS == model::MAX_CHANNELS
+    MAX_CHANNELS == model::DEFAULT_CHANNELS
         && MAX_FEATURES == model::MAX_FEATURES
-        && MAX_OUTPUTS == model::MAX_OUTPUTS
+        && MAX_OUTPUTS == model::DEFAULT_OUTPUTS
         && PREVIEW == flight::PREVIEW
         && TRIPS == Trip::ALL.len()
         && KEPT == Kept::length(1)

@@ -6,13 +6,15 @@
 use super::{Adapter, EndRule, Fade, HISTORY, Inference, Job, Lanes, Preview, Scratch, View, Wanted, features, feedback, window};
 use crate::{
     features::Signals,
-    format::{Card, Feature, Interpolation, MAX_AXES},
+    format::{Card, Feature, Interpolation},
     guard::{Features, Observation, Verdict},
     math::{all_finite, finite_or_zero},
     model::Model,
 };
 
-impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
+impl<const D: usize, const M: usize, const R: usize, const C: usize, const O: usize, const A: usize>
+    Adapter<'_, D, M, R, C, O, A>
+{
     /// One reference tick with all that belongs to it: the reference that the loop shall track. `preview` should reach
     /// [`crate::format::Card::preview_span`]'s future ahead; what is missing is taken as the trajectory's end. The scratch needs
     /// [`crate::network::Network::scratch_words`].
@@ -26,7 +28,7 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
         if let Some(job) = self.begin(tick, preview, measured)
             && let Some(network) = self.model().and_then(Model::network)
         {
-            self.deliver(job.run(network, scratch));
+            self.deliver(job.run_sized(network, scratch));
         }
         self.finish(tick, preview, measured)
     }
@@ -129,7 +131,7 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
     }
 
     /// Takes the result of the last job; one that is not awaited any more is dropped.
-    pub fn deliver(&mut self, inference: Inference) {
+    pub fn deliver(&mut self, inference: Inference<O>) {
         self.ramp.deliver(inference);
     }
 
@@ -147,7 +149,7 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
         tick: i32,
         preview: &Preview<D, N>,
         measured: &[f32; M],
-        path: impl FnOnce(&mut [f32; MAX_AXES]),
+        path: impl FnOnce(&mut [f32; A]),
     ) -> [f32; R] {
         let desired = preview.sample(tick);
         let mut reference = self.desired_reference(preview, &desired, measured);
@@ -268,6 +270,6 @@ fn base<const R: usize>(channels: &[usize; R], desired: &[f32]) -> [f32; R] {
 }
 
 /// Reference ticks in a sub-rate tick. A checked model has at least one; here the compiler sees it too and leaves no panic.
-fn divisor(card: &Card<'_>) -> i32 {
+fn divisor<const C: usize, const O: usize, const A: usize>(card: &Card<'_, C, O, A>) -> i32 {
     i32::from(card.timing.divisor).max(1)
 }
