@@ -49,6 +49,11 @@ impl<const R: usize> Correction<R> {
         values
     }
 
+    /// The correction of each reference channel, and its largest change in a tick.
+    pub(super) fn of_channels(&self) -> (&[f32; R], &[f32; R]) {
+        (&self.values, &self.slews)
+    }
+
     /// None at once: for a loop at rest.
     pub(super) fn reset(&mut self) {
         self.values = [0.0; R];

@@ -265,7 +265,7 @@ fn evaluate(features: &[Feature], signals: &impl Signals, tick: i32, divisor: i3
 }
 
 /// The reference without any correction, of these desired channels.
-fn base<const R: usize>(channels: &[usize; R], desired: &[f32]) -> [f32; R] {
+pub(super) fn base<const R: usize>(channels: &[usize; R], desired: &[f32]) -> [f32; R] {
     channels.map(|channel| desired.get(channel).copied().unwrap_or(0.0))
 }
 

@@ -59,6 +59,7 @@ fn machines_are_trained_from_their_logs_and_flown() {
         let network = Lanes { network: true, feedback: false };
         for (lanes, [mean, worst]) in [network, Lanes::BOTH].into_iter().zip(asked(machine)) {
             let found = reductions(machine, &trained.model, lanes, 5);
+            println!("{machine:?} {lanes:?}: {found:.1?}");
             assert!(found[0] >= mean && found[1] >= worst, "{machine:?} {lanes:?}: {found:.1?}");
         }
         assert!(trained.axes.iter().all(|fit| fit.lane.is_some()), "{machine:?}");
