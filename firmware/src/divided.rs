@@ -155,8 +155,8 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize, const C
     /// [`AddOn::load`]; the first sample of the trajectory will be that of tick 0.
     ///
     /// # Errors
-    /// As [`AddOn::check`], and if the rate is no multiple of the model's, or more than [`MOST_TICKS`] times as high; then nothing
-    /// changes.
+    /// As [`AddOn::check`], and if the rate is no multiple of the model's, or more than [`MOST_TICKS`] times as high; then
+    /// nothing changes.
     pub fn load<'t>(
         &mut self,
         model: &'m Model<'m, C, O, A>,

@@ -20,7 +20,7 @@ use impromptu_flight::{
 
 pub use learner::{LearnerProblem, LearnerReport, LearnerSettings};
 
-/// Most channels of a signal.
+/// Most channels of a signal. A model with more of them, or with more corrected channels, is refused.
 pub const MAX_CHANNELS: usize = 16;
 /// Most network inputs.
 pub const MAX_FEATURES: usize = 128;

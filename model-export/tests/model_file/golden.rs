@@ -1,6 +1,6 @@
 //! The exact bytes of small models: a change of the format, or of what writes it, is seen here. They are also what fuzzing of the
-//! decoder starts from. `UPDATE_GOLDEN=1` rewrites them; both format versions are frozen, so that it must not be needed for a file
-//! that exists.
+//! decoder starts from. `UPDATE_GOLDEN=1` rewrites them; both format versions are frozen: it must not be needed for a file that
+//! exists.
 
 use std::{env, fs, path::Path};
 
