@@ -78,7 +78,7 @@ pub(crate) fn checksum_around(bytes: &[u8], place: usize) -> u32 {
 }
 
 /// The header for a card of this version ([`Card::version`](super::Card::version)) and a blob of these lengths, with
-///  the check sum still zero.
+/// the check sum still zero.
 pub fn header(version: u16, card: u32, blob: u32) -> [u8; HEADER] {
     let mut header = [0; HEADER];
     header[..8].copy_from_slice(&MAGIC);
