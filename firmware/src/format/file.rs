@@ -54,7 +54,7 @@ pub const MAGIC: [u8; 8] = *b"IMPROMPT";
 /// Newest format version that this build reads and writes.
 pub const VERSION: u16 = 3;
 /// Oldest format version that this build reads and writes.
-pub const OLDEST_VERSION: u16 = 2;
+pub const OLDEST_VERSION: u16 = super::limits::OLDEST;
 /// Length of the header in bytes.
 pub const HEADER: usize = 32;
 /// Alignment of the blob and of each of its sections, bytes.

@@ -3,6 +3,8 @@
 //! *in* nothing; *out* the largest counts of any model, and those of a type that says none; *never* one that is passed in silence;
 //! *source* a Cortex-M4F's memory, and eight axes of a machine.
 
+/// Oldest version of the format that this build reads.
+pub(super) const OLDEST: u16 = 2;
 /// Most channels in one signal: for eight axes, each with position, velocity and acceleration, and what else is told.
 pub const MAX_CHANNELS: usize = 32;
 /// Most channels in one signal where a type does not say another number.

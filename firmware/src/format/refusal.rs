@@ -5,7 +5,7 @@
 
 use core::fmt;
 
-use super::file::OLDEST_VERSION;
+use super::limits::OLDEST;
 
 /// The reason, with the name of what is wrong. `Display` also says what to do.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -166,7 +166,7 @@ impl fmt::Display for Refusal {
             Self::Version { found, expected } => {
                 write!(
                     f,
-                    "format version {found}, this build reads {OLDEST_VERSION} to {expected}: export the model with the matching \
+                    "format version {found}, this build reads {OLDEST} to {expected}: export the model with the matching \
                      model-export"
                 )
             }
