@@ -15,7 +15,7 @@ use impromptu_firmware::{
     adapter::{Inference, Job, Lanes},
     add_on::Report,
     exchange::Mailbox,
-    model::{MAX_FEATURES, MAX_OUTPUTS, Model},
+    model::{DEFAULT_OUTPUTS, MAX_FEATURES, Model},
     network::{Network, Scratch},
 };
 use servo::{CAPS, RATE_HZ, SIGNALS, Servo, TrackingError, desired};
@@ -27,7 +27,7 @@ const TICKS: i32 = 20 * RATE_HZ as i32;
 
 /// Between the tasks: the newest job, and the newest result. No lock, no wait.
 static JOBS: Mailbox<MAX_FEATURES> = Mailbox::new();
-static INFERENCES: Mailbox<MAX_OUTPUTS> = Mailbox::new();
+static INFERENCES: Mailbox<DEFAULT_OUTPUTS> = Mailbox::new();
 
 /// The control task, which is never late.
 struct Control<'m> {

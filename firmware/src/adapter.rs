@@ -12,6 +12,7 @@ mod fade;
 mod feedback;
 mod inference;
 mod ramp;
+mod readings;
 mod signals;
 mod tick;
 mod window;
@@ -19,7 +20,7 @@ mod window;
 use crate::{
     caps::{Bounds, Caps},
     features,
-    format::{Channels, EndRule, MAX_OUTPUTS, Refusal},
+    format::{Channels, DEFAULT_AXES, DEFAULT_CHANNELS, DEFAULT_OUTPUTS, EndRule, Refusal},
     guard::{Features, Guard, GuardSettings, Outcome, Trips},
     model::Model,
     network::Scratch,
@@ -42,19 +43,27 @@ pub use crate::{format::HISTORY, lanes::Lanes};
 /// the network, whose [`Inference`] is [delivered](Adapter::deliver): between the two ([`Adapter::step`] does it all), or, by a
 /// task that the control loop interrupts, until the next reference tick ([`Adapter::defer`]).
 #[derive(Debug)]
-pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
-    model: Option<&'m Model<'m>>,
-    guard: Guard,
+pub struct Adapter<
+    'm,
+    const D: usize,
+    const M: usize,
+    const R: usize,
+    const C: usize = DEFAULT_CHANNELS,
+    const O: usize = DEFAULT_OUTPUTS,
+    const A: usize = DEFAULT_AXES,
+> {
+    model: Option<&'m Model<'m, C, O, A>>,
+    guard: Guard<A>,
     /// Desired channel from which each reference channel starts.
     base: [usize; R],
     measured: History<M>,
     references: History<R>,
     /// Sub-rate ticks.
     clock: Clock,
-    ramp: Ramp,
+    ramp: Ramp<O>,
     /// Whether an inference may take up to the next reference tick.
     deferred: bool,
-    feedback: Feedback,
+    feedback: Feedback<A>,
     /// Lanes that are wanted.
     lanes: Lanes,
     /// How far each lane is faded in, 0..=1.
@@ -62,7 +71,7 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
     feedback_weight: f32,
     correction: Correction<R>,
     /// What the application lets the correction be.
-    bounds: Bounds<R>,
+    bounds: Bounds<R, A>,
     /// Of each desired channel the reciprocal of what a window of it may move by in a sub-rate tick.
     paces: [f32; D],
     /// The newest measurement that was one,
@@ -83,7 +92,7 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
     /// and ticks in which the trajectory did not reach as far.
     starved: u32,
     /// What the guard is shown at the next tick: what the lanes did in this one,
-    outcome: Outcome,
+    outcome: Outcome<O, A>,
     /// whether a lane was wanted or acted, so that it counts,
     acted: bool,
     /// the features since then,
@@ -102,7 +111,9 @@ pub struct Adapter<'m, const D: usize, const M: usize, const R: usize> {
     print: u32,
 }
 
-impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
+impl<'m, const D: usize, const M: usize, const R: usize, const C: usize, const O: usize, const A: usize>
+    Adapter<'m, D, M, R, C, O, A>
+{
     /// An adapter without a model, which corrects nothing: all zeros. It is 6 KB large, so a microcontroller has it in a static,
     /// or in something that is one, and [loads](Adapter::load) it there.
     pub const fn empty() -> Self {
@@ -150,7 +161,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     /// # Errors
     /// If signals, rate, bounds or preview length do not fit.
     pub fn new<'t>(
-        model: &'m Model<'m>,
+        model: &'m Model<'m, C, O, A>,
         table: impl Into<Channels<'t>>,
         rate_hz: f32,
         caps: &Caps<'_>,
@@ -167,10 +178,16 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     ///
     /// # Errors
     /// As [`Adapter::new`].
-    pub fn check(model: &Model<'_>, table: &Channels<'_>, rate_hz: f32, caps: &Caps<'_>, capacity: usize) -> Result<(), Refusal> {
+    pub fn check(
+        model: &Model<'_, C, O, A>,
+        table: &Channels<'_>,
+        rate_hz: f32,
+        caps: &Caps<'_>,
+        capacity: usize,
+    ) -> Result<(), Refusal> {
         let card = model.card();
         same_signals(card, table, [D, M, R])?;
-        Bounds::<R>::check(caps, table.reference.len())?;
+        Bounds::<R, A>::check(caps, table.reference.len())?;
         let rate = card.timing.reference_rate_hz;
         // Written so that NaN and infinity are refused.
         let near = rate_hz < f32::MAX && (rate - rate_hz).abs() <= 1e-3 * rate_hz;
@@ -186,7 +203,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
 
     /// Makes this, in its place, what [`Adapter::new`] makes of a model that passes [`Adapter::check`]. With another one it is as
     /// safe, and of no use.
-    pub fn load(&mut self, model: &'m Model<'m>, table: &Channels<'_>, caps: &Caps<'_>) {
+    pub fn load(&mut self, model: &'m Model<'m, C, O, A>, table: &Channels<'_>, caps: &Caps<'_>) {
         let rate_hz = model.card().timing.reference_rate_hz;
         self.model = Some(model);
         self.guard.load(GuardSettings::default(), rate_hz);
@@ -255,7 +272,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     }
 
     /// The model that is flown.
-    pub fn model(&self) -> Option<&'m Model<'m>> {
+    pub fn model(&self) -> Option<&'m Model<'m, C, O, A>> {
         self.model
     }
 
@@ -266,7 +283,7 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
     }
 
     /// Which lanes the guard lets act, and its counterfactual monitor.
-    pub fn guard(&self) -> Option<&Guard> {
+    pub fn guard(&self) -> Option<&Guard<A>> {
         self.model.map(|_| &self.guard)
     }
 
@@ -343,58 +360,9 @@ impl<'m, const D: usize, const M: usize, const R: usize> Adapter<'m, D, M, R> {
         self.jumps.forget(from);
     }
 
-    /// Correction of each output of the model in the last tick.
-    pub fn correction(&self) -> [f32; MAX_OUTPUTS] {
-        self.model.map_or([0.0; MAX_OUTPUTS], |model| self.correction.of_outputs(model.card()))
-    }
-
-    /// What the feedback lane corrected of each reference channel in the last tick, in the channel's unit.
-    pub fn fed_back(&self) -> [f32; R] {
-        let (mut channels, card) = ([0.0; R], self.model.map(Model::card));
-        let Some((card, layout)) = card.and_then(|card| Some((card, card.feedback.as_ref()?))) else { return channels };
-        for (axis, applied) in layout.axes.iter().zip(self.feedback.last()) {
-            let channel = card.outputs.get(usize::from(axis.output)).map(|output| usize::from(output.channel));
-            if let Some(place) = channel.and_then(|channel| channels.get_mut(channel)) {
-                *place += applied;
-            }
-        }
-        channels
-    }
-
-    /// How far the network lane and the feedback lane are faded in, 0..=1.
-    pub fn weights(&self) -> [f32; 2] {
-        [self.network_weight, self.feedback_weight]
-    }
-
-    /// Ticks in which a limit or the slew bounded the correction.
-    pub fn saturations(&self) -> u32 {
-        self.correction.saturations
-    }
-
-    /// Ticks in which the trajectory did not reach as far ahead as the model looks while a lane was wanted: what was missing was
-    /// taken as its end.
-    pub fn starved(&self) -> u32 {
-        self.starved
-    }
-
-    /// The last reference tick that was begun or finished with a model, since the start.
-    pub fn last_tick(&self) -> Option<i32> {
-        self.clock.last()
-    }
-
-    /// Whether the newest measurement was refused, as a channel was not a finite number, and the last one stood in.
-    pub fn bad_sample(&self) -> bool {
-        self.bad > 0
-    }
-
     /// Gives inferences time until the next reference tick. A ramped correction is the same as before: it starts from what was
     /// evaluated a sub-rate tick ago. A held one comes a reference tick later.
     pub fn defer(&mut self) {
         self.deferred = true;
-    }
-
-    /// Inferences that did not come in time. The correction then stays as it is and fades out until one does.
-    pub fn late(&self) -> u32 {
-        self.ramp.late()
     }
 }

@@ -33,7 +33,7 @@ use crate::{
     adapter::{Adapter, Inference, Job, Lanes},
     caps::Caps,
     guard::{Guard, GuardSettings, Trips},
-    model::{Channels, MAX_OUTPUTS, Model, Refusal},
+    model::{Channels, DEFAULT_AXES, DEFAULT_CHANNELS, DEFAULT_OUTPUTS, Model, Refusal},
     network::Scratch,
     preview::{EndRule, Preview},
 };
@@ -68,13 +68,14 @@ impl fmt::Display for PushError {
 impl core::error::Error for PushError {}
 
 /// What an add-on has done.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
-pub struct Report {
+pub struct Report<const O: usize = DEFAULT_OUTPUTS> {
     /// Correction of each output of the model in the last tick, in the channel's unit; zeros behind the last.
-    pub correction: [f32; MAX_OUTPUTS],
+    #[cfg_attr(feature = "serde", serde(with = "serde_big_array::BigArray"))]
+    pub correction: [f32; O],
     /// How far the network lane is faded in, 0..=1.
     pub network_weight: f32,
     /// How far the feedback lane is faded in, 0..=1.
@@ -93,9 +94,28 @@ pub struct Report {
     pub reach: i32,
 }
 
-impl Report {
+impl<const O: usize> Default for Report<O> {
+    fn default() -> Self {
+        Self {
+            correction: [0.0; O],
+            network_weight: 0.0,
+            feedback_weight: 0.0,
+            saturations: 0,
+            late: 0,
+            starved: 0,
+            trips: Trips::default(),
+            next_tick: 0,
+            reach: 0,
+        }
+    }
+}
+
+impl<const O: usize> Report<O> {
     /// Of an adapter whose next sample is that of `next_tick`.
-    pub fn of<const D: usize, const M: usize, const R: usize>(adapter: &Adapter<'_, D, M, R>, next_tick: i32) -> Self {
+    pub fn of<const D: usize, const M: usize, const R: usize, const C: usize, const A: usize>(
+        adapter: &Adapter<'_, D, M, R, C, O, A>,
+        next_tick: i32,
+    ) -> Self {
         let [network_weight, feedback_weight] = adapter.weights();
         Self {
             correction: adapter.correction(),
@@ -117,12 +137,23 @@ impl Report {
 /// Ticks are those of the loop's references, in order and without gaps; after a gap the histories start anew. A reference tick is
 /// one [`AddOn::step`], or, with the network in a task of lower priority, [`AddOn::begin`] and [`AddOn::finish`].
 #[derive(Debug)]
-pub struct AddOn<'m, const D: usize, const M: usize, const R: usize, const N: usize> {
-    adapter: Adapter<'m, D, M, R>,
+pub struct AddOn<
+    'm,
+    const D: usize,
+    const M: usize,
+    const R: usize,
+    const N: usize,
+    const C: usize = DEFAULT_CHANNELS,
+    const O: usize = DEFAULT_OUTPUTS,
+    const A: usize = DEFAULT_AXES,
+> {
+    adapter: Adapter<'m, D, M, R, C, O, A>,
     preview: Preview<D, N>,
 }
 
-impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'m, D, M, R, N> {
+impl<'m, const D: usize, const M: usize, const R: usize, const N: usize, const C: usize, const O: usize, const A: usize>
+    AddOn<'m, D, M, R, N, C, O, A>
+{
     /// An add-on that knows neither a model nor the loop's signals: all zeros, for a static. It is to be [loaded](AddOn::load) or
     /// [bypassed](AddOn::bypass) before it is used.
     pub const fn empty() -> Self {
@@ -135,7 +166,7 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
     /// # Errors
     /// As [`AddOn::check`].
     pub fn new<'t>(
-        model: &'m Model<'m>,
+        model: &'m Model<'m, C, O, A>,
         signals: impl Into<Channels<'t>>,
         rate_hz: f32,
         caps: &Caps<'_>,
@@ -150,8 +181,13 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
     /// # Errors
     /// If the signals differ, the rate does, the bounds say too little, or the model looks at more than `N` samples of the
     /// trajectory.
-    pub fn check<'t>(model: &Model<'_>, signals: impl Into<Channels<'t>>, rate_hz: f32, caps: &Caps<'_>) -> Result<(), Refusal> {
-        Adapter::<D, M, R>::check(model, &signals.into(), rate_hz, caps, N)
+    pub fn check<'t>(
+        model: &Model<'_, C, O, A>,
+        signals: impl Into<Channels<'t>>,
+        rate_hz: f32,
+        caps: &Caps<'_>,
+    ) -> Result<(), Refusal> {
+        Adapter::<D, M, R, C, O, A>::check(model, &signals.into(), rate_hz, caps, N)
     }
 
     /// [`AddOn::new`] in place; nothing of what was here is left but a correction, which goes by its slew.
@@ -160,7 +196,7 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
     /// As [`AddOn::check`]; then nothing changes.
     pub fn load<'t>(
         &mut self,
-        model: &'m Model<'m>,
+        model: &'m Model<'m, C, O, A>,
         signals: impl Into<Channels<'t>>,
         rate_hz: f32,
         caps: &Caps<'_>,
@@ -186,7 +222,7 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
     }
 
     /// The model that is flown.
-    pub fn model(&self) -> Option<&'m Model<'m>> {
+    pub fn model(&self) -> Option<&'m Model<'m, C, O, A>> {
         self.adapter.model()
     }
 
@@ -279,7 +315,7 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
     }
 
     /// Takes the result of the last job; one that is not awaited any more is dropped.
-    pub fn deliver(&mut self, inference: Inference) {
+    pub fn deliver(&mut self, inference: Inference<O>) {
         self.adapter.deliver(inference);
     }
 
@@ -289,12 +325,12 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
     }
 
     /// What was done since the model came.
-    pub fn report(&self) -> Report {
+    pub fn report(&self) -> Report<O> {
         Report::of(&self.adapter, self.next_tick())
     }
 
     /// Which lanes the guard lets act, and its evidence; none without a model.
-    pub fn guard(&self) -> Option<&Guard> {
+    pub fn guard(&self) -> Option<&Guard<A>> {
         self.adapter.guard()
     }
 
@@ -340,12 +376,14 @@ impl<'m, const D: usize, const M: usize, const R: usize, const N: usize> AddOn<'
     }
 
     /// Adapter and trajectory, for whoever does more with them than a whole add-on does.
-    pub fn parts(&mut self) -> (&mut Adapter<'m, D, M, R>, &mut Preview<D, N>) {
+    pub fn parts(&mut self) -> (&mut Adapter<'m, D, M, R, C, O, A>, &mut Preview<D, N>) {
         (&mut self.adapter, &mut self.preview)
     }
 }
 
-impl<const D: usize, const M: usize, const R: usize, const N: usize> Default for AddOn<'_, D, M, R, N> {
+impl<const D: usize, const M: usize, const R: usize, const N: usize, const C: usize, const O: usize, const A: usize> Default
+    for AddOn<'_, D, M, R, N, C, O, A>
+{
     fn default() -> Self {
         Self::empty()
     }

@@ -8,7 +8,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    format::{MAX_AXES, Refusal},
+    format::{DEFAULT_AXES, Refusal},
     math::{abs, clamp},
 };
 
@@ -66,13 +66,13 @@ pub struct Caps<'a> {
 
 /// The bounds as the adapter keeps them.
 #[derive(Clone, Debug)]
-pub(crate) struct Bounds<const R: usize> {
+pub(crate) struct Bounds<const R: usize, const A: usize = DEFAULT_AXES> {
     /// Largest absolute correction of each channel, and largest change of it in a reference tick.
     channels: [(f32, f32); R],
-    sums: Vec<SumCap, MAX_AXES>,
+    sums: Vec<SumCap, A>,
 }
 
-impl<const R: usize> Bounds<R> {
+impl<const R: usize, const A: usize> Bounds<R, A> {
     /// Nothing is corrected: all zeros.
     pub(crate) const EMPTY: Self = Self { channels: [(0.0, 0.0); R], sums: Vec::new() };
 
@@ -89,7 +89,7 @@ impl<const R: usize> Bounds<R> {
         if !caps.channels.iter().all(|cap| sane(cap.limit) && sane(cap.rate)) {
             return bad("limit or rate of a channel");
         }
-        if caps.sums.len() > MAX_AXES {
+        if caps.sums.len() > A {
             return bad("number of sums");
         }
         for sum in caps.sums {
@@ -171,7 +171,7 @@ mod tests {
             Caps { channels: &[CAP, Cap { limit: -1.0, ..CAP }], ..whole },
             Caps { sums: &[SumCap { limit: f32::NAN, ..SUM }], ..whole },
             Caps { sums: &[SumCap { first: (2, 1.0), ..SUM }], ..whole },
-            Caps { sums: &[SUM; MAX_AXES + 1], ..whole },
+            Caps { sums: &[SUM; DEFAULT_AXES + 1], ..whole },
         ];
         for caps in refused {
             assert!(matches!(Bounds::<2>::check(&caps, 2), Err(Refusal::Cap { .. })), "{caps:?}");

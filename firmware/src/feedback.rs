@@ -8,7 +8,7 @@
 use heapless::Vec;
 
 use crate::{
-    format::{Blob, FeedbackAxis, FeedbackLayout, Floats, MAX_AXES, MAX_ERRORS, MAX_LAGS, Refusal, ranges},
+    format::{Blob, DEFAULT_AXES, FeedbackAxis, FeedbackLayout, Floats, MAX_ERRORS, MAX_LAGS, Refusal, ranges},
     math::{abs, clamp, finite_or_zero},
 };
 
@@ -29,39 +29,39 @@ pub struct Axis<'a> {
 
 /// A feedback lane whose shapes and values have been checked.
 #[derive(Debug)]
-pub struct Lane<'a> {
+pub struct Lane<'a, const A: usize = DEFAULT_AXES> {
     lags: usize,
-    axes: Vec<Axis<'a>, MAX_AXES>,
+    axes: Vec<Axis<'a>, A>,
 }
 
-impl<'a> Lane<'a> {
+impl<'a, const A: usize> Lane<'a, A> {
     /// Checks shapes and values of a layout against the blob.
     ///
     /// # Errors
     /// With the section or value that is wrong.
-    pub fn new(layout: &FeedbackLayout, blob: &Blob<'a>) -> Result<Self, Refusal> {
+    pub fn new(layout: &FeedbackLayout<A>, blob: &Blob<'a>) -> Result<Self, Refusal> {
         let mut lane = Self::empty(layout);
         lane.fill(layout, blob)?;
         Ok(lane)
     }
 
     /// [`Lane::new`] in `place`. After an error there may be a part of a lane.
-    pub(crate) fn load(place: &mut Option<Self>, layout: &FeedbackLayout, blob: &Blob<'a>) -> Result<(), Refusal> {
+    pub(crate) fn load(place: &mut Option<Self>, layout: &FeedbackLayout<A>, blob: &Blob<'a>) -> Result<(), Refusal> {
         Self::begin(place, layout).fill(layout, blob)
     }
 
     #[inline(never)]
-    fn begin<'p>(place: &'p mut Option<Self>, layout: &FeedbackLayout) -> &'p mut Self {
+    fn begin<'p>(place: &'p mut Option<Self>, layout: &FeedbackLayout<A>) -> &'p mut Self {
         place.insert(Self::empty(layout))
     }
 
     /// A lane whose axes are yet to come.
-    fn empty(layout: &FeedbackLayout) -> Self {
+    fn empty(layout: &FeedbackLayout<A>) -> Self {
         Self { lags: layout.lags.into(), axes: Vec::new() }
     }
 
     #[inline(never)]
-    fn fill(&mut self, layout: &FeedbackLayout, blob: &Blob<'a>) -> Result<(), Refusal> {
+    fn fill(&mut self, layout: &FeedbackLayout<A>, blob: &Blob<'a>) -> Result<(), Refusal> {
         let lags = self.lags;
         for axis in &layout.axes {
             let count = axis.errors.len() * lags;
@@ -123,9 +123,9 @@ impl AxisState {
     /// `authority` (0..=1) scales the fast clamp and what is integrated; `dt` is the reference's period, s. While not `active`
     /// the lags are filled and the integral stands still: a lane that is faded out must not lose its slow part at once;
     /// [`AxisState::clear_integral`] empties it afterwards.
-    pub fn step(
+    pub fn step<const A: usize>(
         &mut self,
-        lane: &Lane<'_>,
+        lane: &Lane<'_, A>,
         axis: &Axis<'_>,
         errors: [f32; MAX_ERRORS],
         authority: f32,
@@ -161,7 +161,7 @@ impl AxisState {
     }
 
     /// Tells the axis what was really applied of its output.
-    pub fn applied(&mut self, lane: &Lane<'_>, value: f32) {
+    pub fn applied<const A: usize>(&mut self, lane: &Lane<'_, A>, value: f32) {
         push(&mut self.outputs, lane.lags, finite_or_zero(value));
     }
 
@@ -205,13 +205,13 @@ fn dot(coefficients: Floats<'_>, values: &[f32; MAX_LAGS], offset: f32) -> f32 {
 }
 
 /// The lane's output on each axis after [`PROBE_TICKS`] ticks of a fixed pseudo-random error sequence of ±1 cm.
-pub fn probe(lane: &Lane<'_>, dt: f32) -> [f32; MAX_AXES] {
+pub fn probe<const A: usize>(lane: &Lane<'_, A>, dt: f32) -> [f32; A] {
     let mut noise = 1u32;
     let mut draw = || {
         noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         ((noise >> 16) as f32 - 32_768.0) * (0.01 / 32_768.0)
     };
-    let mut results = [0.0; MAX_AXES];
+    let mut results = [0.0; A];
     for (axis, result) in lane.axes.iter().zip(&mut results) {
         let mut state = AxisState::EMPTY;
         for _ in 0..PROBE_TICKS {

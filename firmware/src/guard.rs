@@ -17,7 +17,7 @@ mod swing;
 mod trip;
 mod watch;
 
-use crate::lanes::Lanes;
+use crate::{format::DEFAULT_AXES, lanes::Lanes};
 
 pub use counterfactual::Counterfactual;
 pub use monitor::Monitor;
@@ -29,7 +29,7 @@ use watch::{Watch, ewma_gain};
 
 /// Decides which lanes may act.
 #[derive(Clone, Debug)]
-pub struct Guard {
+pub struct Guard<const A: usize = DEFAULT_AXES> {
     settings: GuardSettings,
     /// Reference ticks in a second.
     rate_hz: f32,
@@ -39,12 +39,12 @@ pub struct Guard {
     outside: u16,
     /// Recent share of ticks in which each lane asked for more than the bounds let pass.
     excess: [f32; 2],
-    oscillation: Oscillation,
-    counterfactual: Counterfactual,
+    oscillation: Oscillation<A>,
+    counterfactual: Counterfactual<A>,
     trips: Trips,
 }
 
-impl Guard {
+impl<const A: usize> Guard<A> {
     /// A guard without a loop, which has seen nothing: all zeros, so that a static with it takes no flash.
     pub(crate) const EMPTY: Self = Self {
         settings: GuardSettings::NONE,
@@ -113,7 +113,7 @@ impl Guard {
     }
 
     /// The counterfactual monitor: errors with and without the lanes. It has seen every reference tick but the last.
-    pub fn counterfactual(&self) -> &Counterfactual {
+    pub fn counterfactual(&self) -> &Counterfactual<A> {
         &self.counterfactual
     }
 
@@ -137,7 +137,7 @@ impl Guard {
     }
 
     /// One reference tick, before the lanes act: learns what they did in the last one, then judges what is seen now.
-    pub(crate) fn tick(&mut self, seen: &Observation<'_>) -> Verdict {
+    pub(crate) fn tick<const O: usize>(&mut self, seen: &Observation<'_, O, A>) -> Verdict {
         self.learn(seen);
         self.outside = match seen.features {
             Features::Unchanged => self.outside,
@@ -156,7 +156,7 @@ impl Guard {
 
     /// What the lanes did in the last reference tick. If none acted, or ticks are missing since, all that was learned is
     /// forgotten.
-    fn learn(&mut self, seen: &Observation<'_>) {
+    fn learn<const O: usize>(&mut self, seen: &Observation<'_, O, A>) {
         let Some(last) = seen.last else {
             self.clear();
             return;
@@ -176,7 +176,7 @@ impl Guard {
     }
 
     /// Trips lanes and lets them come back.
-    fn judge(&mut self, seen: &Observation<'_>) {
+    fn judge<const O: usize>(&mut self, seen: &Observation<'_, O, A>) {
         let settings = &self.settings;
         let late_by = settings.stale_s * self.rate_hz;
         let stale = f32::from(seen.age.saturating_add(seen.bad)) > late_by;

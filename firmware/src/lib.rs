@@ -81,6 +81,7 @@
 //! | 5 | `model` | a model file whose every index, shape and probe has been checked |
 //! | 6 | `adapter` | the add-on: lanes, guard and bounds between the desired trajectory and a loop |
 //! | 7 | `add_on` | the adapter with the trajectory ahead of it, for one loop: what most applications use |
+//! | 8 | `divided` | an add-on at a fraction of the rate of a fast loop, its correction ramped between |
 //! | 6 | `storage` | models in flash, replaced without a new program |
 //!
 //! # Words
@@ -98,6 +99,7 @@
 pub mod adapter;
 pub mod add_on;
 pub mod caps;
+pub mod divided;
 pub mod exchange;
 pub mod features;
 pub mod feedback;
@@ -115,6 +117,7 @@ pub mod storage;
 pub use adapter::{Adapter, Inference, Job};
 pub use add_on::AddOn;
 pub use caps::{Cap, Caps, SumCap};
+pub use divided::Divided;
 pub use format::{Channel, Channels, EndRule, Refusal};
 pub use guard::{GuardSettings, Trip, Trips};
 pub use lanes::Lanes;

@@ -14,14 +14,19 @@ use crate::{
 
 pub use crate::format::*;
 
-/// A model that passed every check.
+/// A model that passed every check, of at most `C` channels in a signal, `O` corrected channels, and `A` axes of the feedback
+/// lane and of the monitor.
+///
+/// Memory is that of the limits, here and in an [adapter](crate::Adapter), and nothing is done for what lies between a model and
+/// its limits but zeros. Without numbers they are enough for a vehicle; one axis needs `Model<'_, 1, 1, 1>` and less; an arm of
+/// eight, each with position and velocity, a [`LargestModel`].
 #[derive(Debug)]
-pub struct Model<'a> {
-    card: Card<'a>,
+pub struct Model<'a, const C: usize = DEFAULT_CHANNELS, const O: usize = DEFAULT_OUTPUTS, const A: usize = DEFAULT_AXES> {
+    card: Card<'a, C, O, A>,
     blob: Blob<'a>,
     network: Option<Network<'a>>,
-    feedback: Option<Lane<'a>>,
-    monitor: Option<Monitor<'a>>,
+    feedback: Option<Lane<'a, A>>,
+    monitor: Option<Monitor<'a, A>>,
     envelope: (Floats<'a>, Floats<'a>),
     bounds: Bounds<'a>,
     checksum: u32,
@@ -29,7 +34,21 @@ pub struct Model<'a> {
     file: &'a [u8],
 }
 
+/// A model of any size that a file can have.
+pub type LargestModel<'a> = Model<'a, MAX_CHANNELS, MAX_OUTPUTS, MAX_AXES>;
+
 impl<'a> Model<'a> {
+    /// Checks a model file and borrows its numbers. The limits are those of a `Model<'_>` without numbers; another type's model
+    /// is [`Model::sized`].
+    ///
+    /// # Errors
+    /// A [`Refusal`] that names what is wrong: header, check sum, card, shapes, indices, values, probes.
+    pub fn from_bytes(bytes: &'a [u8]) -> Result<Self, Refusal> {
+        Self::sized(bytes)
+    }
+}
+
+impl<'a, const C: usize, const O: usize, const A: usize> Model<'a, C, O, A> {
     /// No model: where [`Model::load_into`] puts one. A static that starts with it has 4 KB of flash for its few numbers that are
     /// not zero; made at run time, by [`Model::empty`], it has none.
     pub const EMPTY: Self = Self::empty();
@@ -51,11 +70,11 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// Checks a model file and borrows its numbers.
+    /// [`Model::from_bytes`] of a model whose limits its type says.
     ///
     /// # Errors
-    /// A [`Refusal`] that names what is wrong: header, check sum, card, shapes, indices, values, probes.
-    pub fn from_bytes(bytes: &'a [u8]) -> Result<Self, Refusal> {
+    /// As [`Model::from_bytes`].
+    pub fn sized(bytes: &'a [u8]) -> Result<Self, Refusal> {
         let mut model = Self::EMPTY;
         model.load(bytes, &mut Scratch::new())?;
         Ok(model)
@@ -98,7 +117,7 @@ impl<'a> Model<'a> {
     }
 
     /// What the model says of itself.
-    pub fn card(&self) -> &Card<'a> {
+    pub fn card(&self) -> &Card<'a, C, O, A> {
         &self.card
     }
 
@@ -113,12 +132,12 @@ impl<'a> Model<'a> {
     }
 
     /// The feedback lane's map.
-    pub fn feedback(&self) -> Option<&Lane<'a>> {
+    pub fn feedback(&self) -> Option<&Lane<'a, A>> {
         self.feedback.as_ref()
     }
 
     /// The loop's response to corrections; without it the guard has no counterfactual monitor.
-    pub fn monitor(&self) -> Option<&Monitor<'a>> {
+    pub fn monitor(&self) -> Option<&Monitor<'a, A>> {
         self.monitor.as_ref()
     }
 
@@ -144,18 +163,33 @@ impl<'a> Model<'a> {
 }
 
 #[inline(never)]
-fn load_card<'a>(bytes: &'a [u8], card: &mut Card<'a>, blob: &mut Blob<'a>) -> Result<(), Refusal> {
+fn load_card<'a, const C: usize, const O: usize, const A: usize>(
+    bytes: &'a [u8],
+    card: &mut Card<'a, C, O, A>,
+    blob: &mut Blob<'a>,
+) -> Result<(), Refusal> {
     let (card_bytes, blob_bytes) = file::split(bytes)?;
     *blob = Blob::new(blob_bytes);
-    if decode::card(card_bytes, card)?.is_empty() { Ok(()) } else { Err(Refusal::Card) }
+    if !decode::card(card_bytes, card)?.is_empty() {
+        return Err(Refusal::Card);
+    }
+    // Where the limits are those of version 2, or less, there is nothing to ask.
+    let larger = C > DEFAULT_CHANNELS || O > DEFAULT_OUTPUTS || A > DEFAULT_AXES;
+    if larger
+        && file::version(bytes) == file::OLDEST_VERSION
+        && let Some(refusal) = card.beyond_version_2()
+    {
+        return Err(refusal);
+    }
+    Ok(())
 }
 
 #[inline(never)]
-fn load_rest<'a>(
-    card: &Card<'a>,
+fn load_rest<'a, const C: usize, const O: usize, const A: usize>(
+    card: &Card<'a, C, O, A>,
     blob: &Blob<'a>,
     envelope: &mut (Floats<'a>, Floats<'a>),
-    monitor: &mut Option<Monitor<'a>>,
+    monitor: &mut Option<Monitor<'a, A>>,
     bounds: &mut Bounds<'a>,
 ) -> Result<(), Refusal> {
     *envelope = blob.floats(card.envelope, 2 * card.features.len(), "envelope")?.split_at(card.features.len());

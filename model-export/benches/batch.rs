@@ -5,7 +5,7 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use impromptu_firmware::{
     features::{Feature, Relative, Source},
-    model::{MAX_OUTPUTS, Model},
+    model::{DEFAULT_OUTPUTS, Model},
     network::Scratch,
     preview::EndRule,
 };
@@ -107,7 +107,7 @@ fn batch(criterion: &mut Criterion) {
         let mut float_batch = Batch::of_network(&float);
         let mut integer_batch = Batch::of_model(&model).expect("has one");
         let mut scratch = Scratch::new();
-        let mut outputs = [0.0; MAX_OUTPUTS];
+        let mut outputs = [0.0; DEFAULT_OUTPUTS];
         let mut passes: [(&str, Pass<'_>); 4] = [
             ("float, one by one", Box::new(|| rows.iter().for_each(|row| drop(black_box(float.evaluate(row)))))),
             (

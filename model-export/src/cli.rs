@@ -21,7 +21,7 @@ use clap::{Parser, Subcommand};
 use impromptu_files::text::line;
 use impromptu_firmware::{
     learning::{Kept, NotKept},
-    model::Model,
+    model::LargestModel,
 };
 
 use self::{
@@ -135,7 +135,7 @@ fn inspect(file: &Path, format: Format, out: &mut dyn Write) -> Result<()> {
         Err(reason) => return Err(reason).with_context(|| file.display().to_string()),
     }
     let bytes = unsigned(&bytes);
-    let model = Model::from_bytes(bytes).with_context(|| file.display().to_string())?;
+    let model = LargestModel::sized(bytes).with_context(|| file.display().to_string())?;
     let inspection = Inspection::new(&model, bytes);
     format.print(out, &inspection, || inspection.to_string())
 }

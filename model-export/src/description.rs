@@ -37,8 +37,8 @@ pub struct Signals {
     pub reference: Vec<ChannelDescription>,
 }
 
-impl From<&model::SignalTable<'_>> for Signals {
-    fn from(table: &model::SignalTable<'_>) -> Self {
+impl<const C: usize> From<&model::SignalTable<'_, C>> for Signals {
+    fn from(table: &model::SignalTable<'_, C>) -> Self {
         (&model::Channels::from(table)).into()
     }
 }

@@ -3,8 +3,8 @@
 use impromptu_firmware::{
     feedback,
     model::{
-        self, Arithmetic, Authority, Card, Channel, FeedbackAxis, FeedbackLayout, LayerLayout, Model, MonitorAxis, MonitorLayout,
-        NetworkLayout, Probes, Refusal, Section, SignalTable, file,
+        self, Arithmetic, Authority, Channel, FeedbackAxis, FeedbackLayout, LargestCard as Card, LargestModel as Model,
+        LayerLayout, MonitorAxis, MonitorLayout, NetworkLayout, Probes, Refusal, Section, SignalTable, file,
     },
     network::{self, Network, Scratch, kernel::Width},
 };
@@ -143,7 +143,7 @@ fn channels<'a, const N: usize>(
     bounded(&borrowed, what)
 }
 
-fn lane(description: &Description, blob: &mut BlobWriter) -> Result<Option<FeedbackLayout>, ExportError> {
+fn lane(description: &Description, blob: &mut BlobWriter) -> Result<Option<FeedbackLayout<{ model::MAX_AXES }>>, ExportError> {
     let Some(lane) = &description.feedback_lane else { return Ok(None) };
     let lags = lane.axes.first().map_or(0, |axis| axis.output_coefficients.len());
     within(lags, "lags of the feedback lane", model::MAX_LAGS)?;
@@ -176,7 +176,7 @@ fn lane(description: &Description, blob: &mut BlobWriter) -> Result<Option<Feedb
     Ok(Some(FeedbackLayout { lags: lags as u8, axes: bounded(&axes, "lane axes")?, authority, margins: lane.margins }))
 }
 
-fn monitor(description: &Description, blob: &mut BlobWriter) -> Result<Option<MonitorLayout>, ExportError> {
+fn monitor(description: &Description, blob: &mut BlobWriter) -> Result<Option<MonitorLayout<{ model::MAX_AXES }>>, ExportError> {
     let Some(monitor) = &description.monitor else { return Ok(None) };
     let taps = monitor.axes.iter().flat_map(|axis| &axis.taps).map(Vec::len).next().unwrap_or(1);
     within(taps, "taps of the monitor", model::MAX_TAPS)?;
@@ -274,7 +274,7 @@ pub fn encode(
         feedback: blob.floats(lane_probe.into_iter().take(lane_outputs)),
     };
     let bytes = assemble(&card, &blob.0)?;
-    Model::from_bytes(&bytes).map_err(ExportError::Refused)?;
+    Model::sized(&bytes).map_err(ExportError::Refused)?;
     Ok(bytes)
 }
 
@@ -309,7 +309,7 @@ fn output_bounds(
 fn expected(card: &Card<'_>, blob: &BlobWriter, rows: &[Vec<f32>]) -> Result<(Vec<f32>, [f32; model::MAX_AXES]), ExportError> {
     // What has no probe is checked first, in a file without lanes; the lanes need no file.
     let bare = Card { network: None, feedback: None, bounds: Section::default(), ..card.clone() };
-    Model::from_bytes(&assemble(&bare, &blob.0)?).map_err(ExportError::Refused)?;
+    Model::sized(&assemble(&bare, &blob.0)?).map_err(ExportError::Refused)?;
     let mut outputs = Vec::new();
     if let Some(layout) = &card.network {
         let network = Network::new(layout, &model::Blob::new(&blob.0), card.features.len(), card.outputs.len());
@@ -333,8 +333,9 @@ fn expected(card: &Card<'_>, blob: &BlobWriter, rows: &[Vec<f32>]) -> Result<(Ve
 
 /// Header, card, padding, blob, check sum.
 fn assemble(card: &Card<'_>, blob: &[u8]) -> Result<Vec<u8>, ExportError> {
+    let version = card.version();
     let card = postcard::to_allocvec(card).map_err(|_| ExportError::Refused(Refusal::Card))?;
-    let mut bytes = file::header(card.len() as u32, blob.len() as u32).to_vec();
+    let mut bytes = file::header(version, card.len() as u32, blob.len() as u32).to_vec();
     bytes.extend(&card);
     bytes.resize(bytes.len().next_multiple_of(file::ALIGNMENT), 0);
     bytes.extend(blob);

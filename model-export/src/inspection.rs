@@ -200,7 +200,7 @@ pub struct InspectedMonitorAxis {
 
 impl Inspection {
     /// What `model`, loaded from `bytes`, says.
-    pub fn new(model: &Model<'_>, bytes: &[u8]) -> Self {
+    pub fn new<const C: usize, const O: usize, const A: usize>(model: &Model<'_, C, O, A>, bytes: &[u8]) -> Self {
         let card = model.card();
         let timing = &card.timing;
         let (past_ticks, preview_ticks) = card.preview_span();
@@ -221,7 +221,7 @@ impl Inspection {
         });
         Self {
             name: text(card.name),
-            format_version: file::VERSION,
+            format_version: file::version(bytes),
             size: Size { file: bytes.len(), limit: file::MAX_FILE, card: card_bytes, blob: blob_bytes },
             crc: format!("{:08x}", model.checksum()),
             provenance: Provenance {
@@ -260,7 +260,7 @@ fn text(text: &str) -> String {
 }
 
 /// The signals, with harmless texts.
-fn signals(card: &Card<'_>) -> Signals {
+fn signals<const C: usize, const O: usize, const A: usize>(card: &Card<'_, C, O, A>) -> Signals {
     let mut signals = Signals::from(&card.signals);
     for channel in signals.desired.iter_mut().chain(&mut signals.measured).chain(&mut signals.reference) {
         [&mut channel.name, &mut channel.unit, &mut channel.frame].into_iter().for_each(mend);
@@ -273,7 +273,12 @@ fn channel(channels: &[Channel<'_>], index: u8) -> (String, String) {
     channels.get(usize::from(index)).map_or_else(Default::default, |channel| (text(channel.name), text(channel.unit)))
 }
 
-fn inspected_feature(card: &Card<'_>, feature: &Feature, low: f32, high: f32) -> InspectedFeature {
+fn inspected_feature<const C: usize, const O: usize, const A: usize>(
+    card: &Card<'_, C, O, A>,
+    feature: &Feature,
+    low: f32,
+    high: f32,
+) -> InspectedFeature {
     let signals = &card.signals;
     let (signal, (name, unit)) = match feature.source {
         Source::Desired => ("desired", channel(&signals.desired, feature.channel)),
@@ -302,7 +307,7 @@ fn inspected_bounds(bounds: OutputBounds, limit: f32) -> InspectedBounds {
     }
 }
 
-fn network(model: &Model<'_>) -> Option<InspectedNetwork> {
+fn network<const C: usize, const O: usize, const A: usize>(model: &Model<'_, C, O, A>) -> Option<InspectedNetwork> {
     let layout = model.card().network.as_ref()?;
     let layers = layout.layers.iter().map(|layer| layer.rows);
     let sections = layers.chain([layout.input_normalisation, layout.skip, layout.output_normalisation]);
@@ -320,12 +325,12 @@ fn network(model: &Model<'_>) -> Option<InspectedNetwork> {
     })
 }
 
-fn error(card: &Card<'_>, (measured, desired): (u8, u8)) -> String {
+fn error<const C: usize, const O: usize, const A: usize>(card: &Card<'_, C, O, A>, (measured, desired): (u8, u8)) -> String {
     let (measured, desired) = (channel(&card.signals.measured, measured).0, channel(&card.signals.desired, desired).0);
     format!("measured {measured} - desired {desired}")
 }
 
-fn monitor(model: &Model<'_>) -> Option<InspectedMonitor> {
+fn monitor<const C: usize, const O: usize, const A: usize>(model: &Model<'_, C, O, A>) -> Option<InspectedMonitor> {
     let card = model.card();
     let monitor = model.monitor()?;
     let period_s = f32::from(monitor.divisor()) / card.timing.reference_rate_hz;
@@ -347,7 +352,7 @@ fn monitor(model: &Model<'_>) -> Option<InspectedMonitor> {
     })
 }
 
-fn feedback_lane(model: &Model<'_>) -> Option<InspectedLane> {
+fn feedback_lane<const C: usize, const O: usize, const A: usize>(model: &Model<'_, C, O, A>) -> Option<InspectedLane> {
     let card = model.card();
     let layout = card.feedback.as_ref()?;
     let axes = layout.axes.iter().map(|axis| {

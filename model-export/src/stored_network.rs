@@ -138,12 +138,15 @@ fn integer_layer(blob: &Blob<'_>, width: Width, layout: &LayerLayout, last: bool
 
 impl StoredNetwork {
     /// The network of a loaded model, if it has one.
-    pub fn of_model(model: &Model<'_>) -> Option<Self> {
+    pub fn of_model<const C: usize, const O: usize, const A: usize>(model: &Model<'_, C, O, A>) -> Option<Self> {
         Self::of_card(model.card(), model.blob())
     }
 
     /// The same out of the parts of a file that is still being made.
-    pub(crate) fn of_card(card: &Card<'_>, blob: &Blob<'_>) -> Option<Self> {
+    pub(crate) fn of_card<const C: usize, const O: usize, const A: usize>(
+        card: &Card<'_, C, O, A>,
+        blob: &Blob<'_>,
+    ) -> Option<Self> {
         let layout = card.network.as_ref()?;
         let (inputs, outputs) = (card.features.len(), card.outputs.len());
         let floats = |section: Section| words(blob, section).into_iter().map(f32::from_bits).collect::<Vec<f32>>();

@@ -23,7 +23,11 @@ pub struct Difference {
 }
 
 /// Runs both over `rows` (features in physical units). A model without a network gives zeros everywhere.
-pub fn difference(model: &Model<'_>, network: &FloatNetwork, rows: &[Vec<f32>]) -> Difference {
+pub fn difference<const C: usize, const O: usize, const A: usize>(
+    model: &Model<'_, C, O, A>,
+    network: &FloatNetwork,
+    rows: &[Vec<f32>],
+) -> Difference {
     let zeros = vec![0.0; network.outputs()];
     let mut difference = Difference { rows: rows.len(), rms: zeros.clone(), largest: zeros.clone(), correction_rms: zeros };
     let mut found = vec![0.0f32; rows.len() * network.outputs()];
@@ -96,7 +100,11 @@ pub enum ComparisonError {
 ///
 /// # Errors
 /// If their shapes differ.
-pub fn compare(model: &Model<'_>, network: &FloatNetwork, rows: &[Vec<f32>]) -> Result<Comparison, ComparisonError> {
+pub fn compare<const C: usize, const O: usize, const A: usize>(
+    model: &Model<'_, C, O, A>,
+    network: &FloatNetwork,
+    rows: &[Vec<f32>],
+) -> Result<Comparison, ComparisonError> {
     let card = model.card();
     if model.network().is_none() {
         return Err(ComparisonError::NoNetwork);

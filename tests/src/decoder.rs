@@ -7,7 +7,7 @@ use impromptu_firmware::{
     Cap, Caps,
     adapter::{Adapter, Job, Lanes},
     feedback::{self, AxisState, Lane},
-    model::{Blob, Card, MAX_FEATURES, MAX_OUTPUTS, Model, Probes, Section, file, ranges},
+    model::{Blob, LargestCard, LargestModel, MAX_FEATURES, MAX_OUTPUTS, Model, Probes, Section, file, ranges},
     network::{Network, Scratch},
     preview::{EndRule, Preview},
 };
@@ -27,27 +27,34 @@ pub fn survive(bytes: &[u8]) -> bool {
     with_probes(&repaired).is_some_and(|bytes| load(&bytes)) | loaded
 }
 
-/// Loads a file; if that works, evaluates the network at zero and extremes and flies both lanes.
+/// Loads a file, as small loops do, and with the limits of the largest.
 fn load(bytes: &[u8]) -> bool {
-    let Ok(model) = Model::from_bytes(bytes) else { return false };
+    let small = Model::from_bytes(bytes).map(|model| lean(&model)).is_ok();
+    let large = LargestModel::sized(bytes).map(|model| lean(&model)).is_ok();
+    // What fits version 2 is the same to both.
+    assert!(large || !small);
+    large
+}
+
+/// Evaluates the network of a model at zero and extremes and flies both lanes.
+fn lean<const C: usize, const O: usize, const A: usize>(model: &Model<'_, C, O, A>) {
     let _ = model.card().preview_span();
     if let Some(network) = model.network() {
         let mut scratch = Scratch::new();
         let mixed: [f32; MAX_FEATURES] = core::array::from_fn(|i| EXTREMES[i % EXTREMES.len()]);
         for inputs in EXTREMES.map(|input| [input; MAX_FEATURES]).into_iter().chain([mixed]) {
-            let outputs = Job { tick: 0, inputs }.run(network, &mut scratch).outputs;
+            let outputs = Job { tick: 0, inputs }.run_sized::<_, O>(network, &mut scratch).outputs;
             assert!(outputs.iter().all(|output| output.abs() <= ranges::MAGNITUDE), "{outputs:?}");
         }
     }
     if let Some(lane) = model.feedback() {
         lean_on(lane, 1.0 / model.card().timing.reference_rate_hz);
     }
-    fly(&model);
-    true
+    fly(model);
 }
 
 /// Steps each axis of a feedback lane through extremes: its output is finite and within its clamps.
-fn lean_on(lane: &Lane<'_>, dt: f32) {
+fn lean_on<const A: usize>(lane: &Lane<'_, A>, dt: f32) {
     for axis in lane.axes() {
         let mut state = AxisState::EMPTY;
         let bound = axis.layout().fast_limit + axis.layout().integral_limit;
@@ -61,9 +68,10 @@ fn lean_on(lane: &Lane<'_>, dt: f32) {
 }
 
 /// Steps an adapter of a loop with two channels each, if the model is for one.
-fn fly(model: &Model<'_>) {
+fn fly<const C: usize, const O: usize, const A: usize>(model: &Model<'_, C, O, A>) {
     let card = model.card();
-    let Ok(mut adapter) = Adapter::<2, 2, 2>::new(model, &card.signals, card.timing.reference_rate_hz, &CAPS, PREVIEW) else {
+    let Ok(mut adapter) = Adapter::<2, 2, 2, C, O, A>::new(model, &card.signals, card.timing.reference_rate_hz, &CAPS, PREVIEW)
+    else {
         return;
     };
     let mut scratch = Scratch::new();
@@ -85,7 +93,9 @@ fn with_header(bytes: &[u8]) -> Vec<u8> {
     let card = if announced <= body.len() { announced } else { announced % (body.len() + 1) };
     let blob = body.len().saturating_sub(card.next_multiple_of(file::ALIGNMENT));
     let end = card.next_multiple_of(file::ALIGNMENT) + blob;
-    let mut repaired = file::header(card as u32, blob as u32).to_vec();
+    // Either version, as the file says, if it says one.
+    let version = if file::version(bytes) == file::VERSION { file::VERSION } else { file::OLDEST_VERSION };
+    let mut repaired = file::header(version, card as u32, blob as u32).to_vec();
     repaired.extend(body);
     repaired.resize(file::HEADER + end, 0);
     sealed(repaired)
@@ -94,7 +104,7 @@ fn with_header(bytes: &[u8]) -> Vec<u8> {
 /// The file with the probes that its network and its lane give, so that edited numbers get past the probes.
 fn with_probes(bytes: &[u8]) -> Option<Vec<u8>> {
     let (card, blob) = file::split(bytes).ok()?;
-    let mut card: Card<'_> = postcard::from_bytes(card).ok()?;
+    let mut card: LargestCard<'_> = postcard::from_bytes(card).ok()?;
     let mut blob = blob.to_vec();
     let mut probe = Vec::new();
     if let Some(layout) = &card.feedback {
@@ -119,9 +129,9 @@ fn with_probes(bytes: &[u8]) -> Option<Vec<u8>> {
         section
     };
     card.probes = Probes { count: u8::from(card.network.is_some()), network: section(numbers), feedback: section(probe) };
-    let card = postcard::to_allocvec(&card).ok()?;
-    let mut bytes = file::header(card.len() as u32, blob.len() as u32).to_vec();
-    bytes.extend(card);
+    let encoded = postcard::to_allocvec(&card).ok()?;
+    let mut bytes = file::header(card.version(), encoded.len() as u32, blob.len() as u32).to_vec();
+    bytes.extend(encoded);
     bytes.resize(bytes.len().next_multiple_of(file::ALIGNMENT), 0);
     bytes.extend(blob);
     Some(sealed(bytes))

@@ -3,7 +3,7 @@
 use impromptu_firmware::{
     adapter::{Inference, Lanes},
     guard::Trip,
-    model::{MAX_OUTPUTS, Model},
+    model::{DEFAULT_OUTPUTS, Model},
     network::Scratch,
 };
 use impromptu_flight::{
@@ -130,7 +130,7 @@ fn late_inferences_are_counted_and_leave_the_baseline() {
     let (late, counts) = fly(true, 2_000);
     let (count, trips, correction) = counts.unwrap();
     assert!(count >= 5 && trips >= 1, "{count} late, {trips} trips");
-    assert_eq!(correction, [0.0; MAX_OUTPUTS]);
+    assert_eq!(correction, [0.0; DEFAULT_OUTPUTS]);
     // Not by assert_eq: it would print thousands of commands.
     assert!(late[..2_000] == in_time[..2_000]);
     assert!(in_time[4_000..] != baseline[4_000..]);

@@ -11,7 +11,7 @@ use core::{
 use impromptu_firmware::{
     adapter::{Inference, Job},
     exchange::Mailbox,
-    model::{MAX_FEATURES, MAX_OUTPUTS},
+    model::{DEFAULT_OUTPUTS, MAX_FEATURES},
     network::{Network, Scratch},
     storage::{Arming, Journal, Slot, Uploader},
 };
@@ -50,7 +50,7 @@ pub trait Cost {
 #[derive(Debug)]
 pub struct Tasks {
     jobs: Mailbox<MAX_FEATURES>,
-    inferences: Mailbox<MAX_OUTPUTS>,
+    inferences: Mailbox<DEFAULT_OUTPUTS>,
     uploads: Mailbox<WORDS>,
     outcomes: Mailbox<2>,
     /// Cost of the control task so far, which interrupts the inference; the largest inference without it.

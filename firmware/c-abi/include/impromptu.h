@@ -80,7 +80,7 @@
 // Words of 8 bytes of an impromptu_scratch.
 #define IMPROMPTU_SCRATCH_WORDS 257
 
-// Most channels of a signal.
+// Most channels of a signal. A model with more of them, or with more corrected channels, is refused.
 #define IMPROMPTU_MAX_CHANNELS 16
 
 // Most network inputs.

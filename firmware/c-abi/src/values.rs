@@ -20,7 +20,7 @@ use impromptu_flight::{
 
 pub use learner::{LearnerProblem, LearnerReport, LearnerSettings};
 
-/// Most channels of a signal.
+/// Most channels of a signal. A model with more of them, or with more corrected channels, is refused.
 pub const MAX_CHANNELS: usize = 16;
 /// Most network inputs.
 pub const MAX_FEATURES: usize = 128;
@@ -34,9 +34,9 @@ pub const KEPT: usize = 848;
 pub const PREVIEW: usize = 192;
 
 const _: () = assert!(
-    MAX_CHANNELS == model::MAX_CHANNELS
+    MAX_CHANNELS == model::DEFAULT_CHANNELS
         && MAX_FEATURES == model::MAX_FEATURES
-        && MAX_OUTPUTS == model::MAX_OUTPUTS
+        && MAX_OUTPUTS == model::DEFAULT_OUTPUTS
         && PREVIEW == flight::PREVIEW
         && TRIPS == Trip::ALL.len()
         && KEPT == Kept::length(1)

@@ -13,7 +13,7 @@ use core::num::NonZeroU32;
 use impromptu_firmware::{
     AddOn, Caps,
     adapter::{Adapter, Inference, Job, Lanes},
-    model::{MAX_AXES, Model, Refusal},
+    model::{DEFAULT_AXES, Model, Refusal},
     network::Scratch,
 };
 use nalgebra::{Matrix3, Vector3};
@@ -272,7 +272,7 @@ impl<'m> Flight<'m> {
         tick: Tick,
         state: &State,
         job: &mut Job,
-        path: impl FnOnce(&mut [f32; MAX_AXES]),
+        path: impl FnOnce(&mut [f32; DEFAULT_AXES]),
     ) -> (Option<ThrustVector>, bool) {
         let Some(state) = self.known(state) else { return (None, false) };
         self.position_part(tick, &state, job, path)
@@ -283,7 +283,7 @@ impl<'m> Flight<'m> {
         tick: Tick,
         state: &State,
         job: &mut Job,
-        path: impl FnOnce(&mut [f32; MAX_AXES]),
+        path: impl FnOnce(&mut [f32; DEFAULT_AXES]),
     ) -> (Option<ThrustVector>, bool) {
         let Stage { loops: Some(loops), adapted: corrected } = &mut self.stage else { return (None, false) };
         self.clock = self.clock.at(tick.0, loops.position_divisor);
@@ -340,7 +340,7 @@ fn adapted(
     tick: i32,
     state: &State,
     job: &mut Job,
-    path: impl FnOnce(&mut [f32; MAX_AXES]),
+    path: impl FnOnce(&mut [f32; DEFAULT_AXES]),
 ) -> (Reference, bool) {
     tell_standing(add_on, frozen, tick, state);
     let measured = quadrotor::measured(state);

@@ -5,17 +5,17 @@
 
 use crate::{
     caps::Bounds,
-    format::{Card, MAX_AXES, MAX_OUTPUTS},
+    format::Card,
     guard::{Outcome, Shares},
     math::clamp,
 };
 
 /// What the lanes want of a reference tick.
-pub(super) struct Wanted {
+pub(super) struct Wanted<const O: usize, const A: usize> {
     /// Of each output.
-    pub(super) network: [f32; MAX_OUTPUTS],
+    pub(super) network: [f32; O],
     /// Of each axis of the feedback lane.
-    pub(super) feedback: [f32; MAX_AXES],
+    pub(super) feedback: [f32; A],
     /// How far the lanes are faded in, 0..=1.
     pub(super) network_weight: f32,
     pub(super) feedback_weight: f32,
@@ -41,12 +41,17 @@ impl<const R: usize> Correction<R> {
     }
 
     /// The correction of each output of a model, in its channel's unit.
-    pub(super) fn of_outputs(&self, card: &Card<'_>) -> [f32; MAX_OUTPUTS] {
-        let mut values = [0.0; MAX_OUTPUTS];
+    pub(super) fn of_outputs<const C: usize, const O: usize, const A: usize>(&self, card: &Card<'_, C, O, A>) -> [f32; O] {
+        let mut values = [0.0; O];
         for (value, output) in values.iter_mut().zip(&card.outputs) {
             *value = self.values.get(usize::from(output.channel)).copied().unwrap_or(0.0);
         }
         values
+    }
+
+    /// The correction of each reference channel, and its largest change in a tick.
+    pub(super) fn of_channels(&self) -> (&[f32; R], &[f32; R]) {
+        (&self.values, &self.slews)
     }
 
     /// None at once: for a loop at rest.
@@ -56,18 +61,18 @@ impl<const R: usize> Correction<R> {
 
     /// Adds the lanes to `reference`, within limits and slew; the feedback lane's part by way of `path`. Returns what each axis
     /// of the feedback lane has got, in the outputs' units.
-    pub(super) fn apply(
+    pub(super) fn apply<const C: usize, const O: usize, const A: usize>(
         &mut self,
-        card: &Card<'_>,
-        bounds: &Bounds<R>,
-        wanted: &Wanted,
-        path: impl FnOnce(&mut [f32; MAX_AXES]),
+        card: &Card<'_, C, O, A>,
+        bounds: &Bounds<R, A>,
+        wanted: &Wanted<O, A>,
+        path: impl FnOnce(&mut [f32; A]),
         reference: &mut [f32; R],
-        outcome: &mut Outcome,
-    ) -> [f32; MAX_AXES] {
+        outcome: &mut Outcome<O, A>,
+    ) -> [f32; A] {
         let mut asked = wanted.feedback.map(|value| value * wanted.feedback_weight);
         path(&mut asked);
-        let mut feedback = [None; MAX_OUTPUTS];
+        let mut feedback = [None; O];
         let axes = card.feedback.iter().flat_map(|lane| &lane.axes);
         for (axis, value) in axes.clone().zip(asked) {
             if let Some(place) = feedback.get_mut(usize::from(axis.output)) {
@@ -95,7 +100,7 @@ impl<const R: usize> Correction<R> {
             }
         }
         let Outcome { shares, excess, .. } = outcome;
-        let mut lost = [0.0; MAX_OUTPUTS];
+        let mut lost = [0.0; O];
         let parts = shares.network.iter_mut().zip(&mut shares.feedback).zip(&mut lost);
         let mut saturated = false;
         for ((output, ((network_part, feedback_part), lost)), (network, feedback)) in card.outputs.iter().zip(parts).zip(lanes) {
@@ -114,7 +119,7 @@ impl<const R: usize> Correction<R> {
             }
         }
         self.saturations = self.saturations.saturating_add(u32::from(saturated));
-        let mut applied = [0.0; MAX_AXES];
+        let mut applied = [0.0; A];
         for ((axis, value), got) in axes.zip(wanted.feedback).zip(&mut applied) {
             *got = value * wanted.feedback_weight + lost.get(usize::from(axis.output)).copied().unwrap_or(0.0);
         }
@@ -122,7 +127,7 @@ impl<const R: usize> Correction<R> {
     }
 
     /// Goes towards targets that are within the channels' limits, by their slew, and within what is bounded together.
-    fn approach(&mut self, targets: &[f32; R], bounds: &Bounds<R>) {
+    fn approach<const A: usize>(&mut self, targets: &[f32; R], bounds: &Bounds<R, A>) {
         let last = self.values;
         for ((value, target), slew) in self.values.iter_mut().zip(targets).zip(&self.slews) {
             *value = clamp(*target, *value - slew, *value + slew);
@@ -131,7 +136,7 @@ impl<const R: usize> Correction<R> {
     }
 
     /// Adds what is left of a correction that no model asks for any more; by its slew it goes.
-    pub(super) fn fade(&mut self, bounds: &Bounds<R>, reference: &mut [f32; R]) {
+    pub(super) fn fade<const A: usize>(&mut self, bounds: &Bounds<R, A>, reference: &mut [f32; R]) {
         self.approach(&[0.0; R], bounds);
         for (channel, value) in reference.iter_mut().zip(&self.values) {
             if *value != 0.0 {
@@ -141,10 +146,15 @@ impl<const R: usize> Correction<R> {
     }
 
     /// No correction; not even an addition of zero: the baseline's bits.
-    pub(super) fn clear(&mut self, card: &Card<'_>, wanted: &Wanted, outcome: &mut Outcome) -> [f32; MAX_AXES] {
+    pub(super) fn clear<const C: usize, const O: usize, const A: usize>(
+        &mut self,
+        card: &Card<'_, C, O, A>,
+        wanted: &Wanted<O, A>,
+        outcome: &mut Outcome<O, A>,
+    ) -> [f32; A] {
         self.values = [0.0; R];
         shadow(card, &wanted.network, outcome);
-        [0.0; MAX_AXES]
+        [0.0; A]
     }
 }
 
@@ -153,7 +163,11 @@ fn least(a: f32, b: f32) -> f32 {
 }
 
 /// An outcome in which nothing was applied, with what the network lane would do without the other.
-fn shadow(card: &Card<'_>, network: &[f32; MAX_OUTPUTS], outcome: &mut Outcome) {
+fn shadow<const C: usize, const O: usize, const A: usize>(
+    card: &Card<'_, C, O, A>,
+    network: &[f32; O],
+    outcome: &mut Outcome<O, A>,
+) {
     (outcome.shares, outcome.excess) = (Shares::NONE, [false; 2]);
     for ((only, network), output) in outcome.shares.network_only.iter_mut().zip(network).zip(&card.outputs) {
         *only = clamp(*network, -output.limit, output.limit);

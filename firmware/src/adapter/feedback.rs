@@ -6,7 +6,7 @@
 use super::signals::{matched_desired, matched_error};
 use crate::{
     feedback::AxisState,
-    format::{MAX_AXES, MAX_ERRORS, MAX_INPUTS},
+    format::{MAX_ERRORS, MAX_INPUTS},
     model::Model,
     preview::Preview,
 };
@@ -15,20 +15,20 @@ use crate::{
 const ACTIVITY_LIMIT: f32 = 1e6;
 
 /// Errors of each axis of the feedback lane.
-pub(super) type Errors = [[f32; MAX_ERRORS]; MAX_AXES];
+pub(super) type Errors<const A: usize> = [[f32; MAX_ERRORS]; A];
 
 /// The feedback lane's state.
 #[derive(Debug)]
-pub(super) struct Feedback {
-    axes: [AxisState; MAX_AXES],
+pub(super) struct Feedback<const A: usize> {
+    axes: [AxisState; A],
     /// Activity, the variable of the gain-scheduled saturation: recent peak of what is desired of the loop and of its errors
     /// ([`crate::format::Authority`]).
     activity: f32,
 }
 
-impl Feedback {
+impl<const A: usize> Feedback<A> {
     /// Nothing seen yet: all zeros.
-    pub(super) const EMPTY: Self = Self { axes: [AxisState::EMPTY; MAX_AXES], activity: 0.0 };
+    pub(super) const EMPTY: Self = Self { axes: [AxisState::EMPTY; A], activity: 0.0 };
 
     /// As [`Feedback::EMPTY`], in place.
     pub(super) fn reset(&mut self) {
@@ -39,12 +39,12 @@ impl Feedback {
     }
 
     /// Share of the fast clamps that the feedback lane may use at this tick, at which its axes have these errors.
-    fn authority<const D: usize, const N: usize>(
+    fn authority<const C: usize, const O: usize, const D: usize, const N: usize>(
         &mut self,
-        model: &Model<'_>,
+        model: &Model<'_, C, O, A>,
         tick: i32,
         preview: &Preview<D, N>,
-        errors: &Errors,
+        errors: &Errors<A>,
     ) -> f32 {
         let Some(layout) = &model.card().feedback else { return 1.0 };
         let authority = &layout.authority;
@@ -59,15 +59,15 @@ impl Feedback {
     }
 
     /// The feedback lane's output on each of its axes.
-    pub(super) fn step<const D: usize, const N: usize>(
+    pub(super) fn step<const C: usize, const O: usize, const D: usize, const N: usize>(
         &mut self,
-        model: &Model<'_>,
+        model: &Model<'_, C, O, A>,
         tick: i32,
         preview: &Preview<D, N>,
-        errors: &Errors,
+        errors: &Errors<A>,
         active: bool,
-    ) -> [f32; MAX_AXES] {
-        let mut outputs = [0.0; MAX_AXES];
+    ) -> [f32; A] {
+        let mut outputs = [0.0; A];
         let Some(lane) = model.feedback() else { return outputs };
         let dt = 1.0 / model.card().timing.reference_rate_hz;
         let authority = self.authority(model, tick, preview, errors);
@@ -78,7 +78,7 @@ impl Feedback {
     }
 
     /// Tells the lane what was applied of it.
-    pub(super) fn applied(&mut self, model: &Model<'_>, applied: &[f32; MAX_AXES]) {
+    pub(super) fn applied<const C: usize, const O: usize>(&mut self, model: &Model<'_, C, O, A>, applied: &[f32; A]) {
         if let Some(lane) = model.feedback() {
             for (state, &value) in self.axes.iter_mut().zip(applied).take(lane.axes().len()) {
                 state.applied(lane, value);
@@ -87,7 +87,7 @@ impl Feedback {
     }
 
     /// What was applied last on each axis.
-    pub(super) fn last(&self) -> [f32; MAX_AXES] {
+    pub(super) fn last(&self) -> [f32; A] {
         self.axes.each_ref().map(AxisState::last)
     }
 
@@ -98,13 +98,13 @@ impl Feedback {
 }
 
 /// Errors of each axis of the feedback lane.
-pub(super) fn errors<const D: usize, const N: usize>(
-    model: &Model<'_>,
+pub(super) fn errors<const C: usize, const O: usize, const A: usize, const D: usize, const N: usize>(
+    model: &Model<'_, C, O, A>,
     tick: i32,
     preview: &Preview<D, N>,
     measured: &[f32],
-) -> Errors {
-    let mut errors = [[0.0; MAX_ERRORS]; MAX_AXES];
+) -> Errors<A> {
+    let mut errors = [[0.0; MAX_ERRORS]; A];
     let Some(lane) = model.feedback() else { return errors };
     let delay = model.card().timing.measurement_delay_ticks;
     for (axis, errors) in lane.axes().iter().zip(&mut errors) {
@@ -117,13 +117,13 @@ pub(super) fn errors<const D: usize, const N: usize>(
 
 /// What is desired of each axis of the monitor: at the time of the measurement, and now, of each reference channel that moves it;
 /// `base` names the desired channel from which a reference channel starts.
-pub(super) fn desired<const D: usize, const N: usize>(
-    model: &Model<'_>,
+pub(super) fn desired<const C: usize, const O: usize, const A: usize, const D: usize, const N: usize>(
+    model: &Model<'_, C, O, A>,
     tick: i32,
     preview: &Preview<D, N>,
     base: impl Fn(usize) -> usize,
-) -> ([f32; MAX_AXES], [[f32; MAX_INPUTS]; MAX_AXES]) {
-    let (mut desired, mut references) = ([0.0; MAX_AXES], [[0.0; MAX_INPUTS]; MAX_AXES]);
+) -> ([f32; A], [[f32; MAX_INPUTS]; A]) {
+    let (mut desired, mut references) = ([0.0; A], [[0.0; MAX_INPUTS]; A]);
     let Some(monitor) = model.monitor() else { return (desired, references) };
     let card = model.card();
     for (((axis, _), desired), references) in monitor.axes().iter().zip(&mut desired).zip(&mut references) {
@@ -137,14 +137,14 @@ pub(super) fn desired<const D: usize, const N: usize>(
 }
 
 /// Errors of each axis of the monitor, most of which the feedback lane has already.
-pub(super) fn monitored<const D: usize, const N: usize>(
-    model: &Model<'_>,
+pub(super) fn monitored<const C: usize, const O: usize, const A: usize, const D: usize, const N: usize>(
+    model: &Model<'_, C, O, A>,
     tick: i32,
     preview: &Preview<D, N>,
     measured: &[f32],
-    known: &Errors,
-) -> [f32; MAX_AXES] {
-    let mut errors = [0.0; MAX_AXES];
+    known: &Errors<A>,
+) -> [f32; A] {
+    let mut errors = [0.0; A];
     let Some(monitor) = model.monitor() else { return errors };
     let delay = model.card().timing.measurement_delay_ticks;
     let lane = model.feedback().map_or(&[][..], |lane| lane.axes());

@@ -4,7 +4,7 @@
 //! control loop, so that a task of lower priority can do it.
 
 use crate::{
-    format::{MAX_FEATURES, MAX_OUTPUTS},
+    format::{DEFAULT_OUTPUTS, MAX_FEATURES},
     network::{Network, Scratch, meant},
 };
 
@@ -19,11 +19,11 @@ pub struct Job {
 
 /// One evaluation of the network that was done.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Inference {
+pub struct Inference<const O: usize = DEFAULT_OUTPUTS> {
     /// Reference tick of its [`Job`].
     pub tick: i32,
     /// Correction of each output of the model.
-    pub outputs: [f32; MAX_OUTPUTS],
+    pub outputs: [f32; O],
 }
 
 impl Job {
@@ -33,7 +33,12 @@ impl Job {
     /// Evaluates the network. A correction that is no number, or larger than any that is believed, was not meant and is zero;
     /// with a scratch of fewer words than the network needs each one is.
     pub fn run<const S: usize>(&self, network: &Network<'_>, scratch: &mut Scratch<S>) -> Inference {
-        let mut outputs = [0.0; MAX_OUTPUTS];
+        self.run_sized(network, scratch)
+    }
+
+    /// [`Job::run`] of a model whose limits its type says.
+    pub fn run_sized<const S: usize, const O: usize>(&self, network: &Network<'_>, scratch: &mut Scratch<S>) -> Inference<O> {
+        let mut outputs = [0.0; O];
         network.evaluate(&self.inputs, &mut outputs, scratch);
         Inference { tick: self.tick, outputs: outputs.map(meant) }
     }

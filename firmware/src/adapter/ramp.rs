@@ -4,42 +4,31 @@
 //! *never* a step when an inference is late: the correction stays where it is; *source* the sub-rate of Zhou 2017.
 
 use super::Inference;
-use crate::{
-    format::{Interpolation, MAX_OUTPUTS},
-    math::clamp,
-};
+use crate::{format::Interpolation, math::clamp};
 
 /// Bound of the outputs that are believed: differences of such numbers are numbers.
 const LARGEST: f32 = 1e9;
 
 /// The correction between two sub-rate ticks.
 #[derive(Clone, Debug)]
-pub(super) struct Ramp {
-    start: [f32; MAX_OUTPUTS],
-    end: [f32; MAX_OUTPUTS],
+pub(super) struct Ramp<const O: usize> {
+    start: [f32; O],
+    end: [f32; O],
     primed: bool,
     /// Reference tick whose inference is awaited, and the newest that came.
     awaited: Option<i32>,
     /// Share of its outputs that may act,
     share: f32,
-    delivered: Option<Inference>,
+    delivered: Option<Inference<O>>,
     /// Inferences in a row that did not come in time.
     missing: u16,
     late: u32,
 }
 
-impl Ramp {
+impl<const O: usize> Ramp<O> {
     /// Nothing has been evaluated yet.
-    pub(super) const EMPTY: Self = Self {
-        start: [0.0; MAX_OUTPUTS],
-        end: [0.0; MAX_OUTPUTS],
-        primed: false,
-        awaited: None,
-        share: 0.0,
-        delivered: None,
-        missing: 0,
-        late: 0,
-    };
+    pub(super) const EMPTY: Self =
+        Self { start: [0.0; O], end: [0.0; O], primed: false, awaited: None, share: 0.0, delivered: None, missing: 0, late: 0 };
 
     /// A job was released at this reference tick, of whose outputs this share may act, 0..=1.
     pub(super) fn release(&mut self, tick: i32, share: f32) {
@@ -47,7 +36,7 @@ impl Ramp {
     }
 
     /// Takes the result of the last job; one that is not awaited any more, or not a number in each output, is dropped.
-    pub(super) fn deliver(&mut self, inference: Inference) {
+    pub(super) fn deliver(&mut self, inference: Inference<O>) {
         if self.awaited == Some(inference.tick) && inference.outputs.iter().all(|output| output.is_finite()) {
             self.delivered = Some(inference);
         }
@@ -110,9 +99,9 @@ impl Ramp {
     }
 
     /// The correction `phase` reference ticks after the last of the sub-rate ticks, which are `divisor` apart.
-    pub(super) fn value(&self, interpolation: Interpolation, phase: i32, divisor: i32) -> [f32; MAX_OUTPUTS] {
+    pub(super) fn value(&self, interpolation: Interpolation, phase: i32, divisor: i32) -> [f32; O] {
         match interpolation {
-            _ if !self.primed => [0.0; MAX_OUTPUTS],
+            _ if !self.primed => [0.0; O],
             Interpolation::Linear if phase != 0 => {
                 let share = phase as f32 / divisor as f32;
                 let mut between = self.start;
@@ -132,13 +121,13 @@ mod tests {
     use super::*;
 
     fn inference(tick: i32, value: f32) -> Inference {
-        Inference { tick, outputs: [value; MAX_OUTPUTS] }
+        Inference { tick, outputs: [value; _] }
     }
 
     #[test]
     fn a_late_inference_is_counted_and_the_correction_stays_until_one_is_in_time() {
         let mut ramp = Ramp::EMPTY;
-        let value = |ramp: &Ramp, phase| ramp.value(Interpolation::Linear, phase, 4)[0];
+        let value = |ramp: &Ramp<8>, phase| ramp.value(Interpolation::Linear, phase, 4)[0];
         ramp.release(0, 1.0);
         assert_eq!(value(&ramp, 0), 0.0);
         ramp.deliver(inference(0, 2.0));

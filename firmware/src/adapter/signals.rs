@@ -95,7 +95,11 @@ pub(super) fn measured_channels<const R: usize>(table: &Channels<'_>) -> [Option
 
 /// Refuses a model whose channels are not the application's, or do not fit into arrays of `limits` channels. Array elements
 /// behind the table's channels are not used.
-pub(super) fn same_signals(card: &Card<'_>, table: &Channels<'_>, limits: [usize; 3]) -> Result<(), Refusal> {
+pub(super) fn same_signals<const C: usize, const O: usize, const A: usize>(
+    card: &Card<'_, C, O, A>,
+    table: &Channels<'_>,
+    limits: [usize; 3],
+) -> Result<(), Refusal> {
     let pairs = [
         ("desired", &card.signals.desired, table.desired),
         ("measured", &card.signals.measured, table.measured),

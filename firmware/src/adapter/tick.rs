@@ -6,13 +6,15 @@
 use super::{Adapter, EndRule, Fade, HISTORY, Inference, Job, Lanes, Preview, Scratch, View, Wanted, features, feedback, window};
 use crate::{
     features::Signals,
-    format::{Card, Feature, Interpolation, MAX_AXES},
+    format::{Card, Feature, Interpolation},
     guard::{Features, Observation, Verdict},
     math::{all_finite, finite_or_zero},
     model::Model,
 };
 
-impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
+impl<const D: usize, const M: usize, const R: usize, const C: usize, const O: usize, const A: usize>
+    Adapter<'_, D, M, R, C, O, A>
+{
     /// Reference ticks of the desired trajectory that the model looks back at from the one that is flown; 0 without a model.
     pub fn behind(&self) -> i32 {
         self.model.map_or(0, |_| self.behind)
@@ -31,7 +33,7 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
         if let Some(job) = self.begin(tick, preview, measured)
             && let Some(network) = self.model().and_then(Model::network)
         {
-            self.deliver(job.run(network, scratch));
+            self.deliver(job.run_sized(network, scratch));
         }
         self.finish(tick, preview, measured)
     }
@@ -134,7 +136,7 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
     }
 
     /// Takes the result of the last job; one that is not awaited any more is dropped.
-    pub fn deliver(&mut self, inference: Inference) {
+    pub fn deliver(&mut self, inference: Inference<O>) {
         self.ramp.deliver(inference);
     }
 
@@ -152,7 +154,7 @@ impl<const D: usize, const M: usize, const R: usize> Adapter<'_, D, M, R> {
         tick: i32,
         preview: &Preview<D, N>,
         measured: &[f32; M],
-        path: impl FnOnce(&mut [f32; MAX_AXES]),
+        path: impl FnOnce(&mut [f32; A]),
     ) -> [f32; R] {
         let desired = preview.sample(tick);
         let mut reference = self.desired_reference(preview, &desired, measured);
@@ -268,11 +270,11 @@ fn evaluate(features: &[Feature], signals: &impl Signals, tick: i32, divisor: i3
 }
 
 /// The reference without any correction, of these desired channels.
-fn base<const R: usize>(channels: &[usize; R], desired: &[f32]) -> [f32; R] {
+pub(super) fn base<const R: usize>(channels: &[usize; R], desired: &[f32]) -> [f32; R] {
     channels.map(|channel| desired.get(channel).copied().unwrap_or(0.0))
 }
 
 /// Reference ticks in a sub-rate tick. A checked model has at least one; here the compiler sees it too and leaves no panic.
-fn divisor(card: &Card<'_>) -> i32 {
+fn divisor<const C: usize, const O: usize, const A: usize>(card: &Card<'_, C, O, A>) -> i32 {
     i32::from(card.timing.divisor).max(1)
 }

@@ -100,8 +100,8 @@ fn along(feature: &Feature) -> bool {
 /// For each desired channel the reciprocal of what it may move by in a sub-rate tick: what training moved by, the guard's margin
 /// beyond it, and its floor.
 #[inline(never)]
-pub(super) fn paces<const D: usize>(
-    card: &Card<'_>,
+pub(super) fn paces<const D: usize, const C: usize, const O: usize, const A: usize>(
+    card: &Card<'_, C, O, A>,
     (low, high): &(Floats<'_>, Floats<'_>),
     settings: &GuardSettings,
 ) -> [f32; D] {

@@ -72,7 +72,10 @@ impl<'a> Bounds<'a> {
     pub(crate) const EMPTY: Self = Self(Floats::EMPTY);
 
     /// Checks the bounds against themselves and the limits.
-    pub(crate) fn new(card: &Card<'a>, blob: &Blob<'a>) -> Result<Self, Refusal> {
+    pub(crate) fn new<const C: usize, const O: usize, const A: usize>(
+        card: &Card<'a, C, O, A>,
+        blob: &Blob<'a>,
+    ) -> Result<Self, Refusal> {
         let count = if card.network.is_some() { card.outputs.len() } else { 0 };
         let bounds = Self(blob.floats(card.bounds, FIELDS * count, "output bounds")?);
         for (index, (bounds, output)) in bounds.iter().zip(&card.outputs).enumerate() {

@@ -6,30 +6,13 @@
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use super::{Feature, Source};
-
-/// Most channels in one signal.
-pub const MAX_CHANNELS: usize = 16;
-/// Most network inputs.
-pub const MAX_FEATURES: usize = 128;
-/// Most corrected channels.
-pub const MAX_OUTPUTS: usize = 8;
-/// Most dense layers.
-pub const MAX_LAYERS: usize = 6;
-/// Most units in a layer.
-pub const MAX_WIDTH: usize = 256;
-/// Most axes of a feedback lane.
-pub const MAX_AXES: usize = 4;
-/// Most lags of a feedback lane.
-pub const MAX_LAGS: usize = 32;
-/// Most errors that one axis of a feedback lane reads.
-pub const MAX_ERRORS: usize = 2;
-/// Sub-rate ticks of measured and past reference channels that features can read.
-pub const HISTORY: usize = 16;
-/// Most monitor ticks that a response of the monitor lasts.
-pub const MAX_TAPS: usize = 32;
-/// Most corrections whose response one axis of the monitor adds up.
-pub const MAX_INPUTS: usize = 2;
+use super::{
+    Feature, Refusal, Source, file,
+    limits::{
+        DEFAULT_AXES, DEFAULT_CHANNELS, DEFAULT_OUTPUTS, MAX_AXES, MAX_CHANNELS, MAX_ERRORS, MAX_FEATURES, MAX_INPUTS,
+        MAX_LAYERS, MAX_OUTPUTS,
+    },
+};
 
 /// A piece of the blob: byte offset from the blob's start and length in bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -65,16 +48,16 @@ pub struct Channel<'a> {
 
 /// The signals between which the model maps. An application refuses a model whose tables differ from its own.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct SignalTable<'a> {
+pub struct SignalTable<'a, const C: usize = DEFAULT_CHANNELS> {
     /// Channels of the desired trajectory.
     #[serde(borrow)]
-    pub desired: Vec<Channel<'a>, MAX_CHANNELS>,
+    pub desired: Vec<Channel<'a>, C>,
     /// Channels of the measured state.
     #[serde(borrow)]
-    pub measured: Vec<Channel<'a>, MAX_CHANNELS>,
+    pub measured: Vec<Channel<'a>, C>,
     /// Channels of the reference; each has the name of the desired channel that it starts from.
     #[serde(borrow)]
-    pub reference: Vec<Channel<'a>, MAX_CHANNELS>,
+    pub reference: Vec<Channel<'a>, C>,
 }
 
 /// The signals of an application, in its own order: what a model's [`SignalTable`] must say.
@@ -88,8 +71,8 @@ pub struct Channels<'a> {
     pub reference: &'a [Channel<'a>],
 }
 
-impl<'a> From<&'a SignalTable<'a>> for Channels<'a> {
-    fn from(SignalTable { desired, measured, reference }: &'a SignalTable<'a>) -> Self {
+impl<'a, const C: usize> From<&'a SignalTable<'a, C>> for Channels<'a> {
+    fn from(SignalTable { desired, measured, reference }: &'a SignalTable<'a, C>) -> Self {
         Self { desired, measured, reference }
     }
 }
@@ -249,9 +232,9 @@ pub struct Margins {
 /// loop would, it must not pull as hard. A vehicle whose motors saturate would else be pulled into a tumble.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Authority {
+pub struct Authority<const A: usize = DEFAULT_AXES> {
     /// Desired channels, for example the accelerations; none: full authority always.
-    pub channels: Vec<u8, MAX_AXES>,
+    pub channels: Vec<u8, A>,
     /// Magnitude of the channels at which half of the clamp is left, in their unit.
     pub scale: f32,
     /// Magnitude of the errors at which half of the clamp is left, in the errors' unit.
@@ -262,13 +245,13 @@ pub struct Authority {
 
 /// The feedback lane.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct FeedbackLayout {
+pub struct FeedbackLayout<const A: usize = DEFAULT_AXES> {
     /// Lags of every error and of the past output.
     pub lags: u8,
     /// Axes.
-    pub axes: Vec<FeedbackAxis, MAX_AXES>,
+    pub axes: Vec<FeedbackAxis, A>,
     /// Authority over the fast clamps.
-    pub authority: Authority,
+    pub authority: Authority<A>,
     /// Worst margins over the axes.
     pub margins: Margins,
 }
@@ -288,7 +271,7 @@ pub struct MonitorAxis {
 /// What the guard needs to tell whether the add-on does good: the error without it is the error less the loop's response to the
 /// correction.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct MonitorLayout {
+pub struct MonitorLayout<const A: usize = DEFAULT_AXES> {
     /// Reference ticks in a monitor tick.
     pub divisor: u16,
     /// Monitor ticks that a response lasts.
@@ -296,7 +279,7 @@ pub struct MonitorLayout {
     /// RMS over all axes of the error that validation flights showed with the add-on, in the errors' unit.
     pub validated_rms: f32,
     /// Axes; their errors have one unit.
-    pub axes: Vec<MonitorAxis, MAX_AXES>,
+    pub axes: Vec<MonitorAxis, A>,
 }
 
 /// Inputs with the exact outputs expected, re-run by every machine that loads the file.
@@ -312,7 +295,7 @@ pub struct Probes {
 
 /// Everything about a model but its bulk numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Card<'a> {
+pub struct Card<'a, const C: usize = DEFAULT_CHANNELS, const O: usize = DEFAULT_OUTPUTS, const A: usize = DEFAULT_AXES> {
     /// Name of the model.
     pub name: &'a str,
     /// Where it comes from.
@@ -320,19 +303,19 @@ pub struct Card<'a> {
     pub provenance: Provenance<'a>,
     /// Signals with units and frames.
     #[serde(borrow)]
-    pub signals: SignalTable<'a>,
+    pub signals: SignalTable<'a, C>,
     /// Rates and delays.
     pub timing: Timing,
     /// Network inputs.
     pub features: Vec<Feature, MAX_FEATURES>,
     /// Corrected channels.
-    pub outputs: Vec<Output, MAX_OUTPUTS>,
+    pub outputs: Vec<Output, O>,
     /// Network lane.
     pub network: Option<NetworkLayout>,
     /// Feedback lane.
-    pub feedback: Option<FeedbackLayout>,
+    pub feedback: Option<FeedbackLayout<A>>,
     /// The loop's response, by which the guard judges the lanes.
-    pub monitor: Option<MonitorLayout>,
+    pub monitor: Option<MonitorLayout<A>>,
     /// f32: smallest, then largest value of each feature in training.
     pub envelope: Section,
     /// f32: low, high, difference, lipschitz ([`super::OutputBounds`]) of each output; empty without a network.
@@ -341,7 +324,10 @@ pub struct Card<'a> {
     pub probes: Probes,
 }
 
-impl Card<'_> {
+/// A card of any size that a file can have.
+pub type LargestCard<'a> = Card<'a, MAX_CHANNELS, MAX_OUTPUTS, MAX_AXES>;
+
+impl<const C: usize, const O: usize, const A: usize> Card<'_, C, O, A> {
     /// Of no model.
     pub(crate) const fn empty() -> Self {
         let section = Section { offset: 0, length: 0 };
@@ -365,6 +351,27 @@ impl Card<'_> {
             bounds: section,
             probes: Probes { count: 0, network: section, feedback: section },
         }
+    }
+
+    /// The oldest format version in which a model may have what this one has.
+    pub fn version(&self) -> u16 {
+        if self.beyond_version_2().is_none() { file::OLDEST_VERSION } else { file::VERSION }
+    }
+
+    /// What is more than a model of version 2 may have.
+    pub(crate) fn beyond_version_2(&self) -> Option<Refusal> {
+        let (signals, feedback) = (&self.signals, self.feedback.as_ref());
+        let counts = [
+            ("number of desired channels", signals.desired.len(), DEFAULT_CHANNELS),
+            ("number of measured channels", signals.measured.len(), DEFAULT_CHANNELS),
+            ("number of reference channels", signals.reference.len(), DEFAULT_CHANNELS),
+            ("number of outputs", self.outputs.len(), DEFAULT_OUTPUTS),
+            ("number of axes of the feedback lane", feedback.map_or(0, |lane| lane.axes.len()), DEFAULT_AXES),
+            ("number of lane authority channels", feedback.map_or(0, |lane| lane.authority.channels.len()), DEFAULT_AXES),
+            ("number of axes of the monitor", self.monitor.as_ref().map_or(0, |monitor| monitor.axes.len()), DEFAULT_AXES),
+        ];
+        let (what, found, limit) = counts.into_iter().find(|(_, found, limit)| found > limit)?;
+        Some(Refusal::Shape { what, found: found as u32, limit: limit as u32 })
     }
 
     /// Reference ticks of the past and of the future that the features and the lane read.

@@ -17,7 +17,10 @@ const NOWHERE: Section = Section { offset: 0, length: 0 };
 ///
 /// # Errors
 /// If the bytes are no card ([`Refusal::Card`]), or a list of it is longer than this build holds.
-pub(crate) fn card<'a>(mut bytes: &'a [u8], card: &mut Card<'a>) -> Result<&'a [u8], Refusal> {
+pub(crate) fn card<'a, const C: usize, const O: usize, const A: usize>(
+    mut bytes: &'a [u8],
+    card: &mut Card<'a, C, O, A>,
+) -> Result<&'a [u8], Refusal> {
     let rest = &mut bytes;
     let Card { name, provenance, signals, timing, features, outputs, network, feedback, monitor, envelope, bounds, probes } =
         card;
@@ -58,7 +61,7 @@ fn network_lane(rest: &mut &[u8], place: &mut Option<NetworkLayout>) -> Result<(
     take(rest, &mut layout.output_normalisation)
 }
 
-fn feedback_lane(rest: &mut &[u8], place: &mut Option<FeedbackLayout>) -> Result<(), Refusal> {
+fn feedback_lane<const A: usize>(rest: &mut &[u8], place: &mut Option<FeedbackLayout<A>>) -> Result<(), Refusal> {
     let Some(layout) = option(rest, place, || FeedbackLayout {
         lags: 0,
         axes: Vec::new(),
@@ -74,7 +77,7 @@ fn feedback_lane(rest: &mut &[u8], place: &mut Option<FeedbackLayout>) -> Result
     take(rest, &mut layout.margins)
 }
 
-fn response(rest: &mut &[u8], place: &mut Option<MonitorLayout>) -> Result<(), Refusal> {
+fn response<const A: usize>(rest: &mut &[u8], place: &mut Option<MonitorLayout<A>>) -> Result<(), Refusal> {
     let Some(layout) = option(rest, place, || MonitorLayout { divisor: 0, taps: 0, validated_rms: 0.0, axes: Vec::new() })?
     else {
         return Ok(());
@@ -143,7 +146,7 @@ mod tests {
             if cut {
                 bytes.truncate(keep.index(bytes.len()));
             }
-            let mut found = Card::empty();
+            let mut found: Card<'_> = Card::empty();
             let rest = card(&bytes, &mut found);
             match postcard::take_from_bytes::<Card<'_>>(&bytes) {
                 // By text: a number that is none is not equal to itself.

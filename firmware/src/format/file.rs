@@ -34,8 +34,16 @@
 //! | network probes | probes × (f + o) | f32 features of each probe, then outputs of each |
 //! | lane probe | axes | f32 outputs ([`crate::feedback::probe`]) |
 //!
-//! Version 2 is frozen: `tests/golden/models` holds the exact bytes of small models, which every build of this version reads and
-//! writes.
+//! Versions differ in what a model may have, not in how it is written:
+//!
+//! | version | channels in a signal | corrected channels | axes of a lane and of the monitor |
+//! |--:|--:|--:|--:|
+//! | 2 | 16 | 8 | 4 |
+//! | 3 | 32 | 16 | 8 |
+//!
+//! A model that keeps within version 2 is written as one, so that every firmware that is in the field reads it, and its bytes do
+//! not change; what is larger says so in its version, by which an older build refuses it. Version 2 is frozen:
+//! `tests/golden/models` holds the exact bytes of small models, which every build reads and writes.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 
@@ -43,8 +51,10 @@ use super::refusal::Refusal;
 
 /// First bytes of every model file.
 pub const MAGIC: [u8; 8] = *b"IMPROMPT";
-/// Format version that this build reads and writes.
-pub const VERSION: u16 = 2;
+/// Newest format version that this build reads and writes.
+pub const VERSION: u16 = 3;
+/// Oldest format version that this build reads and writes.
+pub const OLDEST_VERSION: u16 = super::limits::OLDEST;
 /// Length of the header in bytes.
 pub const HEADER: usize = 32;
 /// Alignment of the blob and of each of its sections, bytes.
@@ -67,14 +77,20 @@ pub(crate) fn checksum_around(bytes: &[u8], place: usize) -> u32 {
     digest.finalize()
 }
 
-/// The header for a card and a blob of these lengths, with the check sum still zero.
-pub fn header(card: u32, blob: u32) -> [u8; HEADER] {
+/// The header for a card of this version ([`Card::version`](super::Card::version)) and a blob of these lengths, with
+/// the check sum still zero.
+pub fn header(version: u16, card: u32, blob: u32) -> [u8; HEADER] {
     let mut header = [0; HEADER];
     header[..8].copy_from_slice(&MAGIC);
-    header[8..10].copy_from_slice(&VERSION.to_le_bytes());
+    header[8..10].copy_from_slice(&version.to_le_bytes());
     header[12..16].copy_from_slice(&card.to_le_bytes());
     header[16..20].copy_from_slice(&blob.to_le_bytes());
     header
+}
+
+/// The version that a file says, whatever else it holds; 0 of one that is too short.
+pub fn version(bytes: &[u8]) -> u16 {
+    bytes.get(8..10).and_then(<[u8]>::first_chunk).map_or(0, |version| u16::from_le_bytes(*version))
 }
 
 /// Splits a checked file into card and blob.
@@ -86,8 +102,8 @@ pub fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), Refusal> {
     if header[..8] != MAGIC {
         return Err(Refusal::NotAModel);
     }
-    let version = u16::from_le_bytes([header[8], header[9]]);
-    if version != VERSION {
+    let version = version(bytes);
+    if !(OLDEST_VERSION..=VERSION).contains(&version) {
         return Err(Refusal::Version { found: version, expected: VERSION });
     }
     if header[10..12].iter().chain(&header[24..]).any(|byte| *byte != 0) {

@@ -5,6 +5,8 @@
 
 use core::fmt;
 
+use super::limits::OLDEST;
+
 /// The reason, with the name of what is wrong. `Display` also says what to do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -22,7 +24,7 @@ pub enum Refusal {
     Version {
         /// Version in the file.
         found: u16,
-        /// Version that this build reads.
+        /// Newest version that this build reads.
         expected: u16,
     },
     /// The header's lengths and the number of bytes disagree.
@@ -162,7 +164,11 @@ impl fmt::Display for Refusal {
                 write!(f, "not a model file (its first bytes are not IMPROMPT): give the file that model-export wrote")
             }
             Self::Version { found, expected } => {
-                write!(f, "format version {found}, this build reads {expected}: export the model with the matching model-export")
+                write!(
+                    f,
+                    "format version {found}, this build reads {OLDEST} to {expected}: export the model with the matching \
+                     model-export"
+                )
             }
             Self::Length { expected, found } => {
                 write!(

@@ -18,7 +18,7 @@ use super::{
     watch::ewma_gain,
 };
 use crate::{
-    format::{Floats, MAX_AXES, MAX_INPUTS, MAX_OUTPUTS, MAX_TAPS},
+    format::{DEFAULT_AXES, Floats, MAX_INPUTS, MAX_TAPS},
     math::{clamp, finite_or_zero},
 };
 
@@ -105,38 +105,38 @@ pub struct Energies {
 
 /// Errors with and without the lanes.
 #[derive(Clone, Debug)]
-pub struct Counterfactual {
+pub struct Counterfactual<const A: usize = DEFAULT_AXES> {
     /// Reference ticks in the running monitor tick.
     phase: u16,
     /// Place of the next newest in the rings.
     head: usize,
-    errors: [f32; MAX_AXES],
+    errors: [f32; A],
     /// Of each axis and input.
-    contributions: [[Contributions; MAX_INPUTS]; MAX_AXES],
+    contributions: [[Contributions; MAX_INPUTS]; A],
     /// Of each axis what is desired: of the reference channels that move it,
-    references: [[Past; MAX_INPUTS]; MAX_AXES],
+    references: [[Past; MAX_INPUTS]; A],
     /// and of the axis itself at the time of the measurement.
-    desired: [f32; MAX_AXES],
+    desired: [f32; A],
     /// What the loop made of the feedback lane's part in the last monitor ticks, newest first.
-    before: [[f32; LATER]; MAX_AXES],
+    before: [[f32; LATER]; A],
     energies: Energies,
     harmful: [bool; 2],
     /// What swings.
-    swing: Swing,
+    swing: Swing<A>,
     /// Something was added since the start, or since all was forgotten.
     busy: bool,
 }
 
-impl Counterfactual {
+impl<const A: usize> Counterfactual<A> {
     /// Nothing seen yet: all zeros.
     pub(super) const NONE: Self = Self {
         phase: 0,
         head: 0,
-        errors: [0.0; MAX_AXES],
-        contributions: [[Contributions::EMPTY; MAX_INPUTS]; MAX_AXES],
-        references: [[Past::EMPTY; MAX_INPUTS]; MAX_AXES],
-        desired: [0.0; MAX_AXES],
-        before: [[0.0; LATER]; MAX_AXES],
+        errors: [0.0; A],
+        contributions: [[Contributions::EMPTY; MAX_INPUTS]; A],
+        references: [[Past::EMPTY; MAX_INPUTS]; A],
+        desired: [0.0; A],
+        before: [[0.0; LATER]; A],
         energies: Energies { with: 0.0, without_feedback: 0.0, network_only: 0.0, baseline: 0.0, long_term_baseline: 0.0 },
         harmful: [false; 2],
         swing: Swing::NONE,
@@ -154,7 +154,7 @@ impl Counterfactual {
     }
 
     /// What swings, and what the feedback lane does against it.
-    pub(super) fn swing(&self) -> &Swing {
+    pub(super) fn swing(&self) -> &Swing<A> {
         &self.swing
     }
 
@@ -170,13 +170,19 @@ impl Counterfactual {
         for past in self.references.iter_mut().flatten() {
             *past = Past::EMPTY;
         }
-        (self.phase, self.head, self.errors, self.desired) = (0, 0, [0.0; MAX_AXES], [0.0; MAX_AXES]);
+        (self.phase, self.head, self.errors, self.desired) = (0, 0, [0.0; A], [0.0; A]);
         (self.energies, self.harmful, self.busy) = (Energies::default(), [false; 2], false);
-        (self.swing, self.before) = (Swing::NONE, [[0.0; LATER]; MAX_AXES]);
+        (self.swing, self.before) = (Swing::NONE, [[0.0; LATER]; A]);
     }
 
     /// Adds a reference tick with the errors of the monitor's axes.
-    pub(super) fn observe(&mut self, monitor: &Monitor<'_>, seen: &Outcome, settings: &GuardSettings, rate_hz: f32) {
+    pub(super) fn observe<const O: usize>(
+        &mut self,
+        monitor: &Monitor<'_, A>,
+        seen: &Outcome<O, A>,
+        settings: &GuardSettings,
+        rate_hz: f32,
+    ) {
         let shares = &seen.shares;
         self.swing.rely(seen.network, seen.active, settings, 1.0 / rate_hz);
         let believed = |value: f32| clamp(finite_or_zero(value), -LARGEST, LARGEST);
@@ -200,7 +206,7 @@ impl Counterfactual {
                 past.sum += believed(*value);
             }
         }
-        let share = |shares: &[f32; MAX_OUTPUTS], output: u8| shares.get(usize::from(output)).copied().unwrap_or(0.0);
+        let share = |shares: &[f32; O], output: u8| shares.get(usize::from(output)).copied().unwrap_or(0.0);
         for ((axis, _), contributions) in monitor.axes().iter().zip(&mut self.contributions) {
             for (&output, contributions) in axis.inputs.iter().zip(contributions) {
                 let [network, feedback, more] = &mut contributions.pasts;
@@ -219,7 +225,7 @@ impl Counterfactual {
 
     /// Ends a monitor tick. What else a tick does needs none of its stack.
     #[inline(never)]
-    fn close(&mut self, monitor: &Monitor<'_>, settings: &GuardSettings, rate_hz: f32) {
+    fn close(&mut self, monitor: &Monitor<'_, A>, settings: &GuardSettings, rate_hz: f32) {
         let ticks = f32::from(monitor.divisor());
         let mean = 1.0 / ticks;
         self.head = if self.head == 0 { monitor.taps().saturating_sub(1) } else { self.head - 1 };

@@ -5,23 +5,23 @@
 
 use heapless::Vec;
 
-use crate::format::{Blob, Floats, MAX_AXES, MonitorAxis, MonitorLayout, Refusal};
+use crate::format::{Blob, DEFAULT_AXES, Floats, MonitorAxis, MonitorLayout, Refusal};
 
 /// A checked monitor.
 #[derive(Debug)]
-pub struct Monitor<'a> {
+pub struct Monitor<'a, const A: usize = DEFAULT_AXES> {
     divisor: u16,
     taps: usize,
     validated_rms: f32,
-    axes: Vec<(MonitorAxis, Floats<'a>), MAX_AXES>,
+    axes: Vec<(MonitorAxis, Floats<'a>), A>,
 }
 
-impl<'a> Monitor<'a> {
+impl<'a, const A: usize> Monitor<'a, A> {
     /// Checks the sections of a layout against the blob.
     ///
     /// # Errors
     /// With the section that is wrong.
-    pub fn new(layout: &MonitorLayout, blob: &Blob<'a>) -> Result<Self, Refusal> {
+    pub fn new(layout: &MonitorLayout<A>, blob: &Blob<'a>) -> Result<Self, Refusal> {
         let taps = usize::from(layout.taps);
         let mut axes = Vec::new();
         for axis in &layout.axes {

@@ -5,60 +5,59 @@
 
 use super::{GuardSettings, Monitor};
 use crate::{
-    format::{FeedbackLayout, Floats, MAX_AXES, MAX_INPUTS, MAX_OUTPUTS},
+    format::{FeedbackLayout, Floats, MAX_INPUTS},
     lanes::Lanes,
 };
 
 /// What the lanes contributed to the correction of each output in a reference tick, in the output's unit. The first two add up to
 /// the correction.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Shares {
+pub(crate) struct Shares<const O: usize> {
     /// The network lane's part.
-    pub(crate) network: [f32; MAX_OUTPUTS],
+    pub(crate) network: [f32; O],
     /// The feedback lane's part.
-    pub(crate) feedback: [f32; MAX_OUTPUTS],
+    pub(crate) feedback: [f32; O],
     /// What the network lane would contribute without the feedback lane and in full, within the limits.
-    pub(crate) network_only: [f32; MAX_OUTPUTS],
+    pub(crate) network_only: [f32; O],
 }
 
-impl Shares {
+impl<const O: usize> Shares<O> {
     /// Nothing.
-    pub(crate) const NONE: Self =
-        Self { network: [0.0; MAX_OUTPUTS], feedback: [0.0; MAX_OUTPUTS], network_only: [0.0; MAX_OUTPUTS] };
+    pub(crate) const NONE: Self = Self { network: [0.0; O], feedback: [0.0; O], network_only: [0.0; O] };
 }
 
 /// What the lanes did in a reference tick.
 #[derive(Clone, Debug)]
-pub(crate) struct Outcome {
+pub(crate) struct Outcome<const O: usize, const A: usize> {
     /// What each lane has of the correction.
-    pub(crate) shares: Shares,
+    pub(crate) shares: Shares<O>,
     /// Whether the network and the feedback lane asked for more than the bounds let pass.
     pub(crate) excess: [bool; 2],
     /// Whether the feedback lane was to act,
     pub(crate) active: bool,
     /// and what it asked for on each of its axes, in the outputs' units.
-    pub(crate) asked: [f32; MAX_AXES],
+    pub(crate) asked: [f32; A],
     /// Share of the network lane's correction that acts, 0..=1.
     pub(crate) network: f32,
     /// Errors of the monitor's axes, in their unit.
-    pub(crate) errors: [f32; MAX_AXES],
+    pub(crate) errors: [f32; A],
     /// What is desired of them: at the time of the measurement,
-    pub(crate) desired: [f32; MAX_AXES],
+    pub(crate) desired: [f32; A],
     /// and now, of each reference channel that moves them.
-    pub(crate) references: [[f32; MAX_INPUTS]; MAX_AXES],
+    pub(crate) references: [[f32; MAX_INPUTS]; A],
 }
 
-impl Outcome {
+impl<const O: usize, const A: usize> Outcome<O, A> {
     /// Nothing: all zeros.
     pub(crate) const NONE: Self = Self {
         shares: Shares::NONE,
         excess: [false; 2],
         active: false,
-        asked: [0.0; MAX_AXES],
+        asked: [0.0; A],
         network: 0.0,
-        errors: [0.0; MAX_AXES],
-        desired: [0.0; MAX_AXES],
-        references: [[0.0; MAX_INPUTS]; MAX_AXES],
+        errors: [0.0; A],
+        desired: [0.0; A],
+        references: [[0.0; MAX_INPUTS]; A],
     };
 }
 
@@ -89,15 +88,15 @@ impl Features {
 
 /// One reference tick, before the lanes act.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Observation<'a> {
+pub(crate) struct Observation<'a, const O: usize, const A: usize> {
     /// The feedback lane of the model.
-    pub(crate) lane: Option<&'a FeedbackLayout>,
+    pub(crate) lane: Option<&'a FeedbackLayout<A>>,
     /// The loop's response to corrections.
-    pub(crate) monitor: Option<&'a Monitor<'a>>,
+    pub(crate) monitor: Option<&'a Monitor<'a, A>>,
     /// Lanes that the user wants.
     pub(crate) wanted: Lanes,
     /// What the lanes did in the last reference tick; `None` if none was wanted or acted, or if ticks are missing since.
-    pub(crate) last: Option<&'a Outcome>,
+    pub(crate) last: Option<&'a Outcome<O, A>>,
     /// The network lane's features.
     pub(crate) features: Features,
     /// Whether every desired channel is a finite number.

@@ -10,7 +10,7 @@
 //! between its clamps.
 
 use super::{GuardSettings, watch::ewma_gain};
-use crate::format::{FeedbackLayout, MAX_AXES};
+use crate::format::FeedbackLayout;
 
 /// One axis.
 #[derive(Clone, Copy, Debug)]
@@ -25,18 +25,17 @@ struct Swing {
 
 /// Recent swings of the feedback lane, all axes together.
 #[derive(Clone, Debug)]
-pub(super) struct Oscillation {
-    axes: [Swing; MAX_AXES],
+pub(super) struct Oscillation<const A: usize> {
+    axes: [Swing; A],
     /// Recent turns.
     turns: f32,
     /// Mean square of the way from the mean, in squares of the clamps.
     power: f32,
 }
 
-impl Oscillation {
+impl<const A: usize> Oscillation<A> {
     /// Nothing seen yet: all zeros.
-    pub(super) const NONE: Self =
-        Self { axes: [Swing { extreme: 0.0, rising: false, mean: 0.0 }; MAX_AXES], turns: 0.0, power: 0.0 };
+    pub(super) const NONE: Self = Self { axes: [Swing { extreme: 0.0, rising: false, mean: 0.0 }; A], turns: 0.0, power: 0.0 };
 
     /// Whether the lane swings.
     pub(super) fn present(&self, settings: &GuardSettings) -> bool {
@@ -44,7 +43,7 @@ impl Oscillation {
     }
 
     /// Takes what the lane asks for at a reference tick.
-    pub(super) fn observe(&mut self, lane: &FeedbackLayout, wanted: &[f32; MAX_AXES], settings: &GuardSettings, rate_hz: f32) {
+    pub(super) fn observe(&mut self, lane: &FeedbackLayout<A>, wanted: &[f32; A], settings: &GuardSettings, rate_hz: f32) {
         let recent = ewma_gain(1.0 / (settings.oscillation_s * rate_hz));
         let (mut turns, mut power) = (0.0, 0.0);
         for ((axis, swing), wanted) in lane.axes.iter().zip(&mut self.axes).zip(wanted) {

@@ -14,10 +14,7 @@
 //! loop has settled.
 
 use super::{GuardSettings, watch::ewma_gain};
-use crate::{
-    format::MAX_AXES,
-    math::{clamp, finite_or_zero},
-};
+use crate::math::{clamp, finite_or_zero};
 
 /// Recent share of the network lane from which on, and at which, it is relied on.
 const RELIED: [f32; 2] = [0.7, 0.9];
@@ -35,9 +32,9 @@ const NOMINAL: usize = 3;
 
 /// Recent swinging parts.
 #[derive(Clone, Debug)]
-pub(super) struct Swing {
+pub(super) struct Swing<const A: usize> {
     /// Recent means of each axis: what is slower than a swing.
-    means: [Parts; MAX_AXES],
+    means: [Parts; A],
     /// Recent mean squares of what is left, all axes added.
     energies: Parts,
     /// Recent share of the network lane.
@@ -54,10 +51,10 @@ pub(super) struct Swing {
     active: bool,
 }
 
-impl Swing {
+impl<const A: usize> Swing<A> {
     /// Nothing seen yet: all zeros.
     pub(super) const NONE: Self = Self {
-        means: [[0.0; 5]; MAX_AXES],
+        means: [[0.0; 5]; A],
         energies: [0.0; 5],
         reliance: 0.0,
         share: 0.0,
@@ -152,7 +149,7 @@ mod tests {
     const TICK: f32 = 0.05;
 
     /// After ten seconds of these parts of one axis.
-    fn after(parts: impl Fn(f32) -> Parts, network: f32) -> Swing {
+    fn after(parts: impl Fn(f32) -> Parts, network: f32) -> Swing<1> {
         let (mut swing, settings) = (Swing::NONE, GuardSettings::default());
         for tick in 0..200 {
             swing.rely(network, true, &settings, TICK);
@@ -248,11 +245,11 @@ mod tests {
         fn it_is_a_share_whatever_comes_in(
             values in prop::collection::vec(any::<Parts>(), 1..20), rms in any::<f32>(), network in any::<f32>()
         ) {
-            let (mut swing, settings) = (Swing::NONE, GuardSettings::default());
+            let (mut swing, settings) = (Swing::<4>::NONE, GuardSettings::default());
             for parts in values {
                 swing.rely(network, true, &settings, TICK);
                 let mut swung = [0.0; 5];
-                (0..MAX_AXES).for_each(|axis| swing.add(axis, &parts, &settings, TICK, &mut swung));
+                (0..4).for_each(|axis| swing.add(axis, &parts, &settings, TICK, &mut swung));
                 swing.observe(&swung, rms, &settings, TICK);
                 prop_assert!((0.0..=1.0).contains(&swing.share()), "{}", swing.share());
             }

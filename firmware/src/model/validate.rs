@@ -6,8 +6,8 @@
 use crate::{
     feedback::{self, Lane},
     format::{
-        Blob, Bounds, Card, FeedbackLayout, Floats, HISTORY, MAX_ERRORS, MAX_FEATURES, MAX_LAGS, MAX_OUTPUTS, MAX_TAPS,
-        MAX_WIDTH, MonitorLayout, Refusal, Relative, Source, ranges,
+        Blob, Bounds, Card, FeedbackLayout, Floats, HISTORY, MAX_ERRORS, MAX_FEATURES, MAX_LAGS, MAX_TAPS, MAX_WIDTH,
+        MonitorLayout, Refusal, Relative, Source, ranges,
     },
     network::{Network, Scratch},
 };
@@ -17,7 +17,7 @@ const MAX_OFFSET_TICKS: i32 = 10_000;
 
 /// Indices, ranges and values of a card.
 #[inline(never)]
-pub(super) fn card(card: &Card<'_>) -> Result<(), Refusal> {
+pub(super) fn card<const C: usize, const O: usize, const A: usize>(card: &Card<'_, C, O, A>) -> Result<(), Refusal> {
     timing(card)?;
     signals(card)?;
     features(card)?;
@@ -38,7 +38,7 @@ pub(super) fn card(card: &Card<'_>) -> Result<(), Refusal> {
     card.monitor.as_ref().map_or(Ok(()), |monitor| self::monitor(card, monitor))
 }
 
-fn timing(card: &Card<'_>) -> Result<(), Refusal> {
+fn timing<const C: usize, const O: usize, const A: usize>(card: &Card<'_, C, O, A>) -> Result<(), Refusal> {
     let timing = &card.timing;
     ranges::RATE.check(timing.reference_rate_hz)?;
     ranges::DIVISOR.check(timing.divisor.into())?;
@@ -46,7 +46,7 @@ fn timing(card: &Card<'_>) -> Result<(), Refusal> {
     ranges::FADE.demand(ranges::fade(timing.fade_ticks, timing.reference_rate_hz))
 }
 
-fn signals(card: &Card<'_>) -> Result<(), Refusal> {
+fn signals<const C: usize, const O: usize, const A: usize>(card: &Card<'_, C, O, A>) -> Result<(), Refusal> {
     for (index, channel) in card.signals.reference.iter().enumerate() {
         if !card.signals.desired.iter().any(|desired| desired.name == channel.name) {
             return Err(Refusal::Signal { signal: "reference", channel: index as u8 });
@@ -55,7 +55,7 @@ fn signals(card: &Card<'_>) -> Result<(), Refusal> {
     Ok(())
 }
 
-fn features(card: &Card<'_>) -> Result<(), Refusal> {
+fn features<const C: usize, const O: usize, const A: usize>(card: &Card<'_, C, O, A>) -> Result<(), Refusal> {
     let signals = &card.signals;
     let inside = |found: u8, count: usize, what| {
         if usize::from(found) < count { Ok(()) } else { Err(Refusal::Index { what, found }) }
@@ -86,7 +86,7 @@ fn features(card: &Card<'_>) -> Result<(), Refusal> {
     Ok(())
 }
 
-fn outputs(card: &Card<'_>) -> Result<(), Refusal> {
+fn outputs<const C: usize, const O: usize, const A: usize>(card: &Card<'_, C, O, A>) -> Result<(), Refusal> {
     for (index, output) in card.outputs.iter().enumerate() {
         let found = output.channel;
         if usize::from(found) >= card.signals.reference.len() {
@@ -102,7 +102,10 @@ fn outputs(card: &Card<'_>) -> Result<(), Refusal> {
     Ok(())
 }
 
-fn lane(card: &Card<'_>, lane: &FeedbackLayout) -> Result<(), Refusal> {
+fn lane<const C: usize, const O: usize, const A: usize>(
+    card: &Card<'_, C, O, A>,
+    lane: &FeedbackLayout<A>,
+) -> Result<(), Refusal> {
     if lane.lags == 0 || usize::from(lane.lags) > MAX_LAGS {
         return Err(Refusal::Shape { what: "lane lags", found: lane.lags.into(), limit: MAX_LAGS as u32 });
     }
@@ -147,7 +150,10 @@ fn lane(card: &Card<'_>, lane: &FeedbackLayout) -> Result<(), Refusal> {
     Ok(())
 }
 
-fn monitor(card: &Card<'_>, monitor: &MonitorLayout) -> Result<(), Refusal> {
+fn monitor<const C: usize, const O: usize, const A: usize>(
+    card: &Card<'_, C, O, A>,
+    monitor: &MonitorLayout<A>,
+) -> Result<(), Refusal> {
     if monitor.taps == 0 || usize::from(monitor.taps) > MAX_TAPS {
         return Err(Refusal::Shape { what: "monitor taps", found: monitor.taps.into(), limit: MAX_TAPS as u32 });
     }
@@ -178,8 +184,8 @@ type Envelope<'a> = (Floats<'a>, Floats<'a>);
 
 /// Re-runs the network's probes, of which there must be one: the bits must be the file's, and within its bounds.
 #[inline(never)]
-pub(super) fn network_probes<'a>(
-    card: &Card<'a>,
+pub(super) fn network_probes<'a, const C: usize, const O: usize, const A: usize>(
+    card: &Card<'a, C, O, A>,
     blob: &Blob<'a>,
     network: Option<(&Network<'a>, &Envelope<'a>, &Bounds<'a>)>,
     scratch: &mut Scratch,
@@ -192,7 +198,7 @@ pub(super) fn network_probes<'a>(
     if count == 0 {
         return Err(Refusal::NoProbes);
     }
-    let mut y = [0.0; MAX_OUTPUTS];
+    let mut y = [0.0; O];
     for probe in 0..count {
         // Read where they are: an array of them would lie on the stack below the model that is checked.
         let (x, _) = probe_inputs.split_at(probe * inputs).1.split_at(inputs);
@@ -209,7 +215,11 @@ pub(super) fn network_probes<'a>(
 
 /// Re-runs the lane's probe: the bits must be the file's.
 #[inline(never)]
-pub(super) fn lane_probe(card: &Card<'_>, blob: &Blob<'_>, lane: &Lane<'_>) -> Result<(), Refusal> {
+pub(super) fn lane_probe<const C: usize, const O: usize, const A: usize>(
+    card: &Card<'_, C, O, A>,
+    blob: &Blob<'_>,
+    lane: &Lane<'_, A>,
+) -> Result<(), Refusal> {
     let expected = blob.floats(card.probes.feedback, lane.axes().len(), "lane probe")?;
     let found = feedback::probe(lane, 1.0 / card.timing.reference_rate_hz);
     let same = expected.iter().zip(found).all(|(expected, found)| expected.to_bits() == found.to_bits());

@@ -3,7 +3,7 @@
 //! *in* words of f32 bits; *out* the same of the next layer; *never* another order of operations than the kernel's; *source*
 //! [`super::kernel`].
 
-use super::{kernel, shape::ROWS};
+use super::kernel;
 use crate::format::{
     Activation, Blob, LayerLayout, Refusal, Section,
     ranges::{LAYER_ROWS, Range, SKIP_ROWS},
@@ -55,10 +55,10 @@ impl<'a> Layer<'a> {
         }
     }
 
-    /// Writes the outputs of the skip.
+    /// Writes the outputs of the skip, which has at most this many rows.
     #[inline(never)]
-    pub(super) fn outputs(&self, inputs: &[u32], result: &mut [f32]) {
-        let mut outputs = [0; ROWS];
+    pub(super) fn outputs<const N: usize>(&self, inputs: &[u32], result: &mut [f32]) {
+        let mut outputs = [0; N];
         // It is linear.
         self.kernel.run(inputs, &mut outputs);
         for (result, output) in result.iter_mut().zip(outputs) {

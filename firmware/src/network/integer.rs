@@ -140,7 +140,14 @@ pub(super) fn sums<'s>(layers: &[Layer<'_>], mut current: &'s mut [u32], mut oth
     current
 }
 
-/// Scales of the last layer's rows.
+/// Scales of the last layer's rows, block by block.
+pub(super) fn blocks_of_scales<'a>(layers: &[Layer<'a>]) -> impl Iterator<Item = &'a [[u8; 4]; ROWS]> + use<'a> {
+    // Without layers there is nothing but the skip.
+    let none = core::iter::repeat(&[[0; 4]; ROWS]);
+    layers.last().map(Layer::blocks).into_iter().flatten().map(|(_, _, scales)| scales).chain(none)
+}
+
+/// Scales of the last layer's rows, if it has one block.
 #[inline(always)]
 pub(super) fn scales<'a>(layers: &[Layer<'a>]) -> &'a [[u8; 4]; ROWS] {
     layers.last().and_then(|layer| layer.kernel.stream().last_chunk()).unwrap_or(&[[0; 4]; ROWS])

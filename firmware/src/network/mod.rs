@@ -31,6 +31,9 @@ pub use scratch::{MAX_SCRATCH, Scratch};
 pub use shape::{INPUT_PADDING, ROWS, padded};
 pub use tanh::{TANH_CODE_ERROR, TANH_ERROR, TANH_INPUT_ONE, tanh, tanh_code};
 
+/// Rows of a layer with the most outputs that a model can have.
+const MAX_ROWS: usize = padded(MAX_OUTPUTS);
+
 // Only where floats have no assembly: there is no heap for the larger variant.
 #[allow(clippy::large_enum_variant, reason = "without a heap")]
 #[derive(Debug)]
@@ -127,7 +130,7 @@ impl<'a> Network<'a> {
                 Layers::Integer { code: layout.input_code, layers: heapless::Vec::new() }
             }
         };
-        let half = scratch::half(layout, inputs);
+        let half = scratch::half(layout, inputs, outputs);
         Ok(place.insert(Self { mean, reciprocal_scale, layers, skip, output_scale, output_mean, multiply_adds, half }))
     }
 
@@ -191,8 +194,12 @@ impl<'a> Network<'a> {
             Layers::Integer { code, layers } => {
                 integer::encode(*code, self.mean.len(), layers, back, front);
                 self.skip(back, outputs);
-                let sums = integer::sums(layers, front, back).iter().zip(integer::scales(layers));
-                self.denormalise(sums.map(|(sum, scale)| *sum as i32 as f32 * f32::from_le_bytes(*scale)), outputs);
+                let sums = integer::sums(layers, front, back);
+                if self.output_scale.len() > ROWS {
+                    self.denormalise_blocks(sums, integer::blocks_of_scales(layers), outputs);
+                } else {
+                    self.denormalise(scaled(sums, integer::scales(layers)), outputs);
+                }
             }
         }
     }
@@ -219,8 +226,19 @@ impl<'a> Network<'a> {
         // The rows behind the last output are padding.
         let count = self.output_scale.len().min(outputs.len());
         if let (Some(skip), Some(outputs)) = (&self.skip, outputs.get_mut(..count)) {
-            skip.outputs(normalised, outputs);
+            if count > ROWS {
+                skip.outputs::<MAX_ROWS>(normalised, outputs);
+            } else {
+                skip.outputs::<ROWS>(normalised, outputs);
+            }
         }
+    }
+
+    /// [`Network::denormalise`] of integer layers with more outputs than a block has rows.
+    #[inline(never)]
+    fn denormalise_blocks<'s>(&self, sums: &[u32], scales: impl Iterator<Item = &'s [[u8; 4]; ROWS]>, outputs: &mut [f32]) {
+        let values = sums.chunks(ROWS).zip(scales).flat_map(|(sums, scales)| scaled(sums, scales));
+        self.denormalise(values, outputs);
     }
 
     /// Adds the dense layers' outputs to the skip's, and makes physical units of them.
@@ -232,6 +250,12 @@ impl<'a> Network<'a> {
             *output = (skip + value) * scale + mean;
         }
     }
+}
+
+/// Accumulators of a block, each times the scale of its row.
+#[inline(always)]
+fn scaled(sums: &[u32], scales: &[[u8; 4]; ROWS]) -> impl Iterator<Item = f32> {
+    sums.iter().zip(scales).map(|(sum, scale)| *sum as i32 as f32 * f32::from_le_bytes(*scale))
 }
 
 /// An output that is no number, or larger than any that is believed, was not meant: 0.

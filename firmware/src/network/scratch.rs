@@ -44,10 +44,10 @@ impl<const WORDS: usize> Default for Scratch<WORDS> {
 }
 
 /// Words of the activations of the widest layer of a checked network, the inputs included.
-pub(super) fn half(layout: &NetworkLayout, inputs: usize) -> usize {
+pub(super) fn half(layout: &NetworkLayout, inputs: usize, outputs: usize) -> usize {
     // The normalised inputs are f32 in any arithmetic; integer layers take two outputs to a word;
-    // the last one's accumulators need a half too.
+    // the last one's accumulators take a word each.
     let codes = if layout.arithmetic == Arithmetic::Float { 1 } else { 2 };
     let hidden = layout.layers.iter().rev().skip(1).map(|layer| padded(usize::from(layer.outputs)) / codes);
-    hidden.fold(inputs.next_multiple_of(INPUT_PADDING).max(ROWS), usize::max)
+    hidden.fold(inputs.next_multiple_of(INPUT_PADDING).max(padded(outputs)), usize::max)
 }

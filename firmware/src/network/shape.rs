@@ -3,15 +3,12 @@
 //! *in* numbers of outputs and inputs; *out* the same rounded up to whole blocks; *never* a block that is partly filled; *source*
 //! the streams of [`super::kernel`].
 
-use crate::format::MAX_OUTPUTS;
-
 /// Outputs that are computed side by side.
 pub const ROWS: usize = 8;
-const _: () = assert!(MAX_OUTPUTS == ROWS);
 /// Inputs of an integer layer are padded to a multiple of this; of a float layer to a multiple of 2.
 pub const INPUT_PADDING: usize = 4;
 
 /// Rows of a packed layer: outputs rounded up to whole blocks.
-pub fn padded(outputs: usize) -> usize {
+pub const fn padded(outputs: usize) -> usize {
     outputs.next_multiple_of(ROWS)
 }

@@ -3,7 +3,7 @@
 //! *in* models of the axes; *out* lanes as a model stores them, not flown yet; *never* a size that the loop's own error and time
 //! constant do not give; *source* the grid of `impromptu-training`, scaled.
 
-use impromptu_firmware::model::{MAX_AXES, Margins};
+use impromptu_firmware::model::Margins;
 use impromptu_model_export::description::{AuthorityDescription, LaneAxisDescription, LaneDescription};
 use impromptu_training::feedback_design::{DesignRefusal, DesignSettings, LaneDesign, design, smallest};
 use rayon::prelude::*;
@@ -92,7 +92,7 @@ pub fn authority(layout: &Layout, axes: &[DesignAxis<'_>], rate_hz: f64) -> Auth
     let largest = axes.iter().map(|axis| axis.scale.length).fold(0.0, f64::max);
     let fastest = axes.iter().map(|axis| axis.scale.length / axis.scale.time.powi(2)).fold(0.0, f64::max);
     let slowest = axes.iter().map(|axis| axis.scale.time).fold(0.0, f64::max);
-    let channels: Vec<u8> = axes.iter().filter_map(|axis| layout.axes[axis.place].desired[2]).take(MAX_AXES).collect();
+    let channels: Vec<u8> = axes.iter().filter_map(|axis| layout.axes[axis.place].desired[2]).collect();
     AuthorityDescription {
         channels,
         scale: (AUTHORITY[1] * fastest) as f32,

@@ -4,7 +4,7 @@
 //! apart have not judged; *source* `impromptu-training`, which does this for a simulated vehicle.
 
 use impromptu_diagnosis::prediction::root_mean_square;
-use impromptu_firmware::{Lanes, model::MAX_AXES};
+use impromptu_firmware::Lanes;
 use impromptu_model_export::{
     ExportError,
     description::{LaneDescription, MonitorAxisDescription, MonitorDescription},
@@ -15,7 +15,7 @@ use serde::Serialize;
 use crate::{
     candidates::{DesignAxis, authority, lane_of},
     description::LoopDescription,
-    design::{Chosen, Judge, NoLane},
+    design::{Chosen, Judge},
     layout::Layout,
     prepared::Prepared,
     reading::AxisSignals,
@@ -125,8 +125,7 @@ pub fn complete(request: &Request<'_>) -> Result<Completed, ExportError> {
         encode: &|lane| encode(lane, None),
     };
     let benches = judge.benches(&axes, *draws);
-    let mut lanes = judge.choose(&axes, &benches)?;
-    only_the_best(&mut lanes);
+    let lanes = judge.choose(&axes, &benches)?;
     let found: Vec<&Chosen> = lanes.iter().filter_map(|lane| lane.as_ref().ok()).collect();
     let lane = (!found.is_empty()).then(|| {
         let parts: Vec<_> = found.iter().map(|chosen| (&chosen.lane, chosen.margins)).collect();
@@ -155,21 +154,6 @@ pub fn complete(request: &Request<'_>) -> Result<Completed, ExportError> {
         }
     });
     Ok(Completed { axes: fits.collect(), lane, monitor })
-}
-
-/// A model holds so many lanes: those that help most stay.
-fn only_the_best(lanes: &mut [Result<Chosen, NoLane>]) {
-    let mut scores: Vec<f64> = lanes.iter().filter_map(|lane| lane.as_ref().ok()).map(|lane| lane.score).collect();
-    scores.sort_by(|a, b| b.total_cmp(a));
-    let Some(&least) = scores.get(MAX_AXES.saturating_sub(1)) else { return };
-    let mut left = MAX_AXES;
-    for lane in lanes {
-        let stays = lane.as_ref().is_ok_and(|lane| lane.score >= least) && left > 0;
-        left -= usize::from(stays);
-        if lane.is_ok() && !stays {
-            *lane = Err(NoLane::Full);
-        }
-    }
 }
 
 /// Mean reduction, and the range of 95 % of the flights.
@@ -210,6 +194,6 @@ fn monitor(request: &Request<'_>, validated_rms: f32) -> Option<MonitorDescripti
             }
             Some(MonitorAxisDescription { error: (channels.measured[0]?, channels.desired[0]?), inputs, taps })
         });
-    let axes: Vec<MonitorAxisDescription> = axes.take(MAX_AXES).collect();
+    let axes: Vec<MonitorAxisDescription> = axes.collect();
     (!axes.is_empty()).then_some(MonitorDescription { divisor: divisor as u16, validated_rms, axes })
 }

@@ -31,6 +31,7 @@ use serde::{Deserialize, Serialize};
 
 /// Most axes of a loop.
 pub const MOST_AXES: usize = 8;
+const _: () = assert!(MOST_AXES <= impromptu_firmware::model::MAX_AXES);
 /// Slowest and fastest reference, Hz.
 pub const RATES: [f64; 2] = [10.0, 2000.0];
 

@@ -8,7 +8,7 @@
 use impromptu_diagnosis::prediction::root_mean_square;
 use impromptu_firmware::{
     Lanes,
-    model::{MAX_AXES, Margins, Model},
+    model::{LargestModel, Margins},
 };
 use impromptu_model_export::{
     ExportError,
@@ -36,8 +36,6 @@ pub struct Chosen {
     pub margins: Margins,
     /// The design in words.
     pub design: String,
-    /// Score: mean over the cases of 90 % of the average and 10 % of the worst reduction, %.
-    pub score: f64,
     /// Worst reduction of any piece on any model in any case, %.
     pub worst: f64,
 }
@@ -48,9 +46,6 @@ pub enum NoLane {
     /// No design exists.
     #[error("{0}")]
     Design(#[from] DesignRefusal),
-    /// Other axes gain more.
-    #[error("a model holds {MAX_AXES} lanes, and other axes gain more by theirs")]
-    Full,
     /// None is good enough.
     #[error(
         "of {designs} designs none left every piece of the logs better than the loop alone; the best one's worst was \
@@ -128,7 +123,7 @@ impl Judge<'_> {
         let Some((bytes, lanes)) = model else {
             return Ok(bench.iter().map(|piece| piece.errors(case, self.age_ticks, self.settled, None)).collect());
         };
-        let model = Model::from_bytes(bytes).map_err(ExportError::Refused)?;
+        let model = LargestModel::sized(bytes).map_err(ExportError::Refused)?;
         bench
             .iter()
             .map(|piece| {
@@ -170,7 +165,7 @@ impl Judge<'_> {
         Ok((0..axes.len()).map(|axis| best(&candidates, &scores, axis)).collect())
     }
 
-    /// How a candidate does on each axis. A model holds so many lanes: axes are judged as many at a time.
+    /// How a candidate does on each axis.
     fn scores(
         &self,
         candidate: &Candidate,
@@ -186,20 +181,21 @@ impl Judge<'_> {
             .enumerate()
             .filter_map(|(axis, designed)| designed.as_ref().ok().map(|(lane, margins)| (axis, lane, *margins)))
             .collect();
-        for group in designed.chunks(MAX_AXES) {
-            let parts: Vec<_> = group.iter().map(|(_, lane, margins)| (*lane, *margins)).collect();
-            let bytes = (self.encode)(Some(&lane_of(&parts, authority.clone())))?;
-            for (bench, alone) in benches.iter().zip(alone) {
-                let usual = &alone[0][0];
-                for ((weight, case), [baseline, network]) in cases.iter().zip(alone) {
-                    let errors = self.errors(bench, *case, Some((&bytes, Lanes::BOTH)))?;
-                    for (axis, ..) in group {
-                        let of = |errors: &[Vec<f64>]| errors.iter().map(|errors| errors[*axis]).collect::<Vec<_>>();
-                        let score = scores[*axis].get_or_insert(Score { mean: 0.0, worst: f64::INFINITY, case: "" });
-                        // A model that swings by itself in this case is not this loop, or the loop is to blame.
-                        if root_mean_square(of(baseline)) <= SWINGS * root_mean_square(of(usual)) {
-                            score.add(*weight / benches.len() as f64, case.name, [&of(baseline), &of(network), &of(&errors)]);
-                        }
+        if designed.is_empty() {
+            return Ok(scores);
+        }
+        let parts: Vec<_> = designed.iter().map(|(_, lane, margins)| (*lane, *margins)).collect();
+        let bytes = (self.encode)(Some(&lane_of(&parts, authority.clone())))?;
+        for (bench, alone) in benches.iter().zip(alone) {
+            let usual = &alone[0][0];
+            for ((weight, case), [baseline, network]) in cases.iter().zip(alone) {
+                let errors = self.errors(bench, *case, Some((&bytes, Lanes::BOTH)))?;
+                for (axis, ..) in &designed {
+                    let of = |errors: &[Vec<f64>]| errors.iter().map(|errors| errors[*axis]).collect::<Vec<_>>();
+                    let score = scores[*axis].get_or_insert(Score { mean: 0.0, worst: f64::INFINITY, case: "" });
+                    // A model that swings by itself in this case is not this loop, or the loop is to blame.
+                    if root_mean_square(of(baseline)) <= SWINGS * root_mean_square(of(usual)) {
+                        score.add(*weight / benches.len() as f64, case.name, [&of(baseline), &of(network), &of(&errors)]);
                     }
                 }
             }
@@ -246,10 +242,10 @@ impl Score {
 fn best(candidates: &[Candidate], scores: &[Vec<Option<Score>>], axis: usize) -> Result<Chosen, NoLane> {
     let scored = || candidates.iter().zip(scores).filter_map(|(candidate, scores)| scores[axis].map(|score| (candidate, score)));
     let good = scored().filter(|(_, score)| score.worst >= 0.0).max_by(|(_, a), (_, b)| a.mean.total_cmp(&b.mean));
-    if let Some((candidate, Score { mean, worst, .. })) = good
+    if let Some((candidate, Score { worst, .. })) = good
         && let Ok((lane, margins)) = &candidate.axes[axis]
     {
-        return Ok(Chosen { lane: lane.clone(), margins: *margins, design: candidate.words.clone(), score: mean, worst });
+        return Ok(Chosen { lane: lane.clone(), margins: *margins, design: candidate.words.clone(), worst });
     }
     match scored().max_by(|(_, a), (_, b)| a.worst.total_cmp(&b.worst)) {
         Some((_, score)) => Err(NoLane::Worse { designs: scored().count(), worst: score.worst, case: score.case }),

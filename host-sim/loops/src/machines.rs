@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use impromptu_firmware::{
     Lanes,
-    model::{MAX_CHANNELS, Model, Refusal},
+    model::{LargestModel, MAX_CHANNELS, Refusal},
 };
 use impromptu_model_export::description::Signals;
 use rand::{RngExt as _, SeedableRng as _};
@@ -331,7 +331,7 @@ pub enum FlyError {
 pub fn flown(
     machine: Machine,
     desired: &[Vec<f64>],
-    model: Option<(&Model<'_>, Lanes)>,
+    model: Option<(&LargestModel<'_>, Lanes)>,
     seed: u64,
 ) -> Result<Vec<f64>, FlyError> {
     let layout = Layout::of(&machine.description())?;

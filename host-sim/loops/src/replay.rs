@@ -11,7 +11,7 @@
 use impromptu_firmware::{
     AddOn, Cap, Caps, Lanes, Scratch,
     guard::GuardSettings,
-    model::{MAX_CHANNELS, Model, Refusal},
+    model::{LargestModel, MAX_AXES, MAX_CHANNELS, MAX_OUTPUTS, Refusal},
 };
 use impromptu_training::feedback_design::ArxModel;
 
@@ -24,8 +24,8 @@ use crate::{
 /// Most samples of the desired trajectory that an add-on on the host keeps.
 const PREVIEW: usize = 1024;
 
-/// The add-on of any loop.
-pub type HostAddOn<'m> = AddOn<'m, MAX_CHANNELS, MAX_CHANNELS, MAX_CHANNELS, PREVIEW>;
+/// The add-on of any loop, with a model of any size.
+pub type HostAddOn<'m> = AddOn<'m, MAX_CHANNELS, MAX_CHANNELS, MAX_CHANNELS, PREVIEW, MAX_CHANNELS, MAX_OUTPUTS, MAX_AXES>;
 
 /// How a flight differs from the log.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -173,7 +173,7 @@ fn pairs(signals: &AxisSignals) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
 ///
 /// # Errors
 /// If the model runs at another rate, or looks further than the preview keeps.
-pub fn host_add_on<'m>(model: &'m Model<'m>, rate_hz: f64, lanes: Lanes) -> Result<Box<HostAddOn<'m>>, Refusal> {
+pub fn host_add_on<'m>(model: &'m LargestModel<'m>, rate_hz: f64, lanes: Lanes) -> Result<Box<HostAddOn<'m>>, Refusal> {
     let card = model.card();
     let cap = |channel: usize| {
         let output = card.outputs.iter().find(|output| usize::from(output.channel) == channel);
@@ -201,7 +201,13 @@ impl<'m, 'l> Flight<'m, 'l> {
     ///
     /// # Errors
     /// If the model is for another loop.
-    pub fn new(model: &'m Model<'m>, layout: &'l Layout, rate_hz: f64, lanes: Lanes, guarded: bool) -> Result<Self, Refusal> {
+    pub fn new(
+        model: &'m LargestModel<'m>,
+        layout: &'l Layout,
+        rate_hz: f64,
+        lanes: Lanes,
+        guarded: bool,
+    ) -> Result<Self, Refusal> {
         let mut add_on = host_add_on(model, rate_hz, lanes)?;
         if !guarded {
             add_on.set_guard(GuardSettings::OFF);

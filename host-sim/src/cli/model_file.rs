@@ -35,9 +35,9 @@ impl ModelFile {
         &self.bytes
     }
 
-    /// The model, checked as the firmware checks it.
-    pub(super) fn model(&self) -> Result<Model<'_>> {
-        Model::from_bytes(&self.bytes).with_context(|| format!("{}: refused", self.name()))
+    /// The model, checked as a firmware with these limits checks it.
+    pub(super) fn model<const C: usize, const O: usize, const A: usize>(&self) -> Result<Model<'_, C, O, A>> {
+        Model::sized(&self.bytes).with_context(|| format!("{}: refused", self.name()))
     }
 
     /// What the model was made for, if it is flown with something else.

@@ -116,7 +116,7 @@ impl Batch {
     }
 
     /// The network of a loaded model, if it has one.
-    pub fn of_model(model: &Model<'_>) -> Option<Self> {
+    pub fn of_model<const C: usize, const O: usize, const A: usize>(model: &Model<'_, C, O, A>) -> Option<Self> {
         let stored = StoredNetwork::of_model(model)?;
         let (inputs, outputs) = (stored.input_mean.len(), stored.output_mean.len());
         Some(Self {

@@ -8,7 +8,7 @@ use std::{
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use impromptu_files::{place, replacement::replace, text::line};
-use impromptu_firmware::model::Model;
+use impromptu_firmware::model::LargestModel;
 use serde::Serialize;
 
 use super::{
@@ -107,7 +107,7 @@ impl Export {
             PrecisionName::Int16 => Precision::Int16,
         };
         let bytes = encode(&description, network.as_ref(), precision, &calibration)?;
-        let model = Model::from_bytes(&bytes)?;
+        let model = LargestModel::sized(&bytes)?;
         let comparison = match &network {
             Some(network) if !calibration.is_empty() => Some(compare(&model, network, &calibration)?),
             _ => None,

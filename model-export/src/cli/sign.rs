@@ -5,7 +5,7 @@ use std::{io::Write, path::PathBuf};
 use anyhow::{Context, Result};
 use clap::Args;
 use impromptu_files::{place, replacement::replace, text::line};
-use impromptu_firmware::model::Model;
+use impromptu_firmware::model::LargestModel;
 use serde::Serialize;
 
 use super::{
@@ -88,7 +88,7 @@ impl Sign {
         let bytes = read(&self.file)?;
         let signed = key.sign(&bytes, self.model_version).with_context(|| self.file.display().to_string())?;
         // Nobody shall vouch for a file that no machine flies.
-        Model::from_bytes(&bytes).with_context(|| self.file.display().to_string())?;
+        LargestModel::sized(&bytes).with_context(|| self.file.display().to_string())?;
         place::check(&self.output)
             .and_then(|()| place::apart(&self.output, [&self.file, &self.key]))
             .with_context(|| format!("--output {}", self.output.display()))?;

@@ -5,7 +5,7 @@ use std::{io::Write, path::PathBuf};
 use anyhow::{Context, Result};
 use clap::Args;
 use impromptu_files::text::line;
-use impromptu_firmware::model::Model;
+use impromptu_firmware::model::LargestModel;
 use serde::Serialize;
 
 use super::{
@@ -74,7 +74,7 @@ impl Verify {
             }
             None => None,
         };
-        let model = Model::from_bytes(unsigned(&bytes)).with_context(|| self.file.display().to_string())?;
+        let model = LargestModel::sized(unsigned(&bytes)).with_context(|| self.file.display().to_string())?;
         let comparison = match &self.network {
             Some(path) => {
                 let network = FloatNetwork::read(path)?;

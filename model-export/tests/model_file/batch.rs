@@ -1,7 +1,7 @@
 //! A batch gives the bits of single evaluations.
 
 use impromptu_firmware::{
-    model::{MAX_OUTPUTS, Model},
+    model::{DEFAULT_OUTPUTS, Model},
     network::Scratch,
 };
 use impromptu_model_export::{
@@ -48,7 +48,7 @@ fn every_row_has_the_bits_of_a_single_evaluation() {
             let model = Model::from_bytes(&bytes).unwrap();
             let mut scratch = Scratch::new();
             Batch::of_model(&model).unwrap().evaluate(all.iter().map(Vec::as_slice), |row, outputs| {
-                let mut single = [0.0; MAX_OUTPUTS];
+                let mut single = [0.0; DEFAULT_OUTPUTS];
                 model.network().unwrap().evaluate(&all[row], &mut single, &mut scratch);
                 assert_eq!(bits(outputs), bits(&single[..2]), "{hidden:?}, {precision:?}, row {row}");
             });

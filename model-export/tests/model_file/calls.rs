@@ -4,7 +4,7 @@ use impromptu_firmware::{
     AddOn, Cap, Caps, Lanes,
     adapter::Inference,
     guard::GuardSettings,
-    model::{Interpolation, MAX_OUTPUTS, Model},
+    model::{DEFAULT_OUTPUTS, Interpolation, Model},
     network::Scratch,
 };
 use proptest::prelude::*;
@@ -139,7 +139,7 @@ proptest! {
                 Call::Airborne(airborne) => add_on.set_airborne(airborne),
                 Call::Deliver(ahead, bits) => add_on.deliver(Inference {
                     tick: tick.wrapping_add(ahead),
-                    outputs: [f32::from_bits(bits); MAX_OUTPUTS],
+                    outputs: [f32::from_bits(bits); DEFAULT_OUTPUTS],
                 }),
                 Call::Ticks(count) => ticks = count,
             }

@@ -4,7 +4,7 @@ use impromptu_firmware::{
     adapter::Job,
     feedback::{self, AxisState, Lane},
     model::{
-        Arithmetic, Blob, Card, MAX_ERRORS, MAX_FEATURES, MAX_OUTPUTS, Model, Probes, Refusal, Section, file,
+        Arithmetic, Blob, Card, DEFAULT_OUTPUTS, MAX_ERRORS, MAX_FEATURES, Model, Probes, Refusal, Section, file,
         ranges::{MAGNITUDE, RANGES, Range},
     },
     network::{Network, Scratch},
@@ -98,7 +98,7 @@ fn at_the_edges(seed: u64, precision: Precision) -> Vec<u8> {
 /// Probes at zero.
 fn probe(card: &mut Card<'_>, blob: &mut Vec<u8>) {
     let (features, count) = (card.features.len(), card.outputs.len());
-    let mut outputs = [0.0; MAX_OUTPUTS];
+    let mut outputs = [0.0; DEFAULT_OUTPUTS];
     let spoilt = blob.clone();
     let network = Network::new(card.network.as_ref().unwrap(), &Blob::new(&spoilt), features, count).unwrap();
     network.evaluate(&[0.0; MAX_FEATURES], &mut outputs, &mut Scratch::new());

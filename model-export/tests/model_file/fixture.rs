@@ -173,7 +173,7 @@ pub(crate) fn table(description: &Description) -> SignalTable<'_> {
 
 /// Header, card bytes, padding, blob, check sum: what `encode` does in its last step, for cards that it would not write.
 pub(crate) fn assembled(card: &[u8], blob: &[u8]) -> Vec<u8> {
-    let mut bytes = file::header(card.len() as u32, blob.len() as u32).to_vec();
+    let mut bytes = file::header(file::OLDEST_VERSION, card.len() as u32, blob.len() as u32).to_vec();
     bytes.extend(card);
     bytes.resize(bytes.len().next_multiple_of(file::ALIGNMENT), 0);
     bytes.extend(blob);

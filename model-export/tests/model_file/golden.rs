@@ -1,13 +1,16 @@
 //! The exact bytes of small models: a change of the format, or of what writes it, is seen here. They are also what fuzzing of the
-//! decoder starts from. `UPDATE_GOLDEN=1` rewrites them; format version 1 is frozen, so that it must not be needed for a file
-//! that exists.
+//! decoder starts from. `UPDATE_GOLDEN=1` rewrites them; both format versions are frozen: it must not be needed for a file that
+//! exists.
 
 use std::{env, fs, path::Path};
 
-use impromptu_firmware::model::{Model, file};
+use impromptu_firmware::model::{LargestModel, Model, file};
 use impromptu_model_export::{Precision, encode, float_network::Activation};
 
-use crate::fixture::{Numbers, description, network, rows, small_model};
+use crate::{
+    fixture::{Numbers, description, network, rows, small_model},
+    large::model,
+};
 
 /// A float network with a skip, no lane.
 fn float_model() -> Vec<u8> {
@@ -27,7 +30,12 @@ fn difference(golden: &[u8], found: &[u8]) -> String {
 #[test]
 fn the_format_is_what_it_was() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/golden/models");
-    for (name, bytes) in [("float-skip.model", float_model()), ("int8-lane.model", small_model(Precision::Int8))] {
+    let eight_axes = model(8, Precision::Int8, &[(9, Activation::Relu)], true, 4);
+    for (name, bytes, version) in [
+        ("float-skip.model", float_model(), 2),
+        ("int8-lane.model", small_model(Precision::Int8), 2),
+        ("eight-axes.model", eight_axes, 3),
+    ] {
         let path = folder.join(name);
         if env::var_os("UPDATE_GOLDEN").is_some_and(|value| value == "1") {
             fs::write(&path, &bytes).unwrap();
@@ -35,8 +43,9 @@ fn the_format_is_what_it_was() {
         let golden = fs::read(&path).unwrap();
         assert!(golden == bytes, "{name}: {}", difference(&golden, &bytes));
         // What an older build wrote is read for as long as the version is the same.
-        assert!(Model::from_bytes(&golden).is_ok());
-        assert_eq!(&golden[..12], b"IMPROMPT\x02\0\0\0");
+        assert!(LargestModel::sized(&golden).is_ok());
+        assert_eq!(Model::from_bytes(&golden).is_ok(), version == 2);
+        assert_eq!(golden[..12], *[&b"IMPROMPT"[..], &[version, 0, 0, 0]].concat());
     }
-    assert_eq!((file::VERSION, file::HEADER, file::ALIGNMENT), (2, 32, 16));
+    assert_eq!((file::OLDEST_VERSION, file::VERSION, file::HEADER, file::ALIGNMENT), (2, 3, 32, 16));
 }

@@ -11,6 +11,7 @@ mod description;
 mod edges;
 mod golden;
 mod guard;
+mod large;
 mod precision;
 mod refusals;
 mod round_trip;

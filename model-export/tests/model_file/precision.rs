@@ -1,7 +1,7 @@
 //! What the number formats cost in precision, on networks as they are before training: random weights of He's scale.
 
 use impromptu_firmware::{
-    model::{MAX_OUTPUTS, Model},
+    model::{DEFAULT_OUTPUTS, Model},
     network::Scratch,
 };
 use impromptu_model_export::{
@@ -91,7 +91,7 @@ fn error(widths: &[usize], activation: Activation, gain: f32, precision: Precisi
     let model = Model::from_bytes(&bytes).unwrap();
     let (mut worst, mut square, mut count) = (0.0f64, 0.0, 0.0);
     for row in rows(1000) {
-        let mut found = [0.0; MAX_OUTPUTS];
+        let mut found = [0.0; DEFAULT_OUTPUTS];
         model.network().unwrap().evaluate(&row, &mut found, &mut Scratch::new());
         for (expected, found) in exact(&network, &row).iter().zip(found) {
             worst = worst.max((expected - f64::from(found)).abs());

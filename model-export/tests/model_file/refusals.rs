@@ -2,7 +2,7 @@
 
 use impromptu_firmware::{
     features::{Feature, Relative, Source},
-    model::{Card, MAX_AXES, MAX_FEATURES, MAX_INPUTS, Model, MonitorAxis, MonitorLayout, Refusal, Section, file},
+    model::{Card, DEFAULT_AXES, MAX_FEATURES, MAX_INPUTS, Model, MonitorAxis, MonitorLayout, Refusal, Section, file},
 };
 use impromptu_model_export::Precision;
 
@@ -163,8 +163,8 @@ fn more_of_the_monitor_than_this_build_holds() {
         Model::from_bytes(&assembled(&more, blob)).map(|_| ()).unwrap_err()
     };
     let axes = |count: usize| with(&|monitor| monitor.axes = (0..count).map(|_| axis(1)).collect());
-    let refusal = refused(&axes(MAX_AXES), &axes(0), MAX_AXES, &postcard::to_allocvec(&axis(1)).unwrap());
-    let (found, limit) = (MAX_AXES as u32 + 1, MAX_AXES as u32);
+    let refusal = refused(&axes(DEFAULT_AXES), &axes(0), DEFAULT_AXES, &postcard::to_allocvec(&axis(1)).unwrap());
+    let (found, limit) = (DEFAULT_AXES as u32 + 1, DEFAULT_AXES as u32);
     assert_eq!(refusal, Refusal::Shape { what: "number of axes of the monitor", found, limit });
     // A list within a list has no name.
     let inputs = |count: usize| with(&|monitor| monitor.axes = [axis(1), axis(count)].into_iter().collect());

@@ -7,7 +7,7 @@ use core::{
 
 use embedded_io::{Read, Write};
 use impromptu_firmware::{
-    model::{MAX_FEATURES, MAX_OUTPUTS, Model},
+    model::{DEFAULT_OUTPUTS, MAX_FEATURES, Model},
     network::{Network, Scratch},
 };
 
@@ -26,7 +26,7 @@ pub(crate) fn run<const WORDS: usize>(
     let mut place = Model::EMPTY;
     let model = Model::load_into(&mut place, file, &mut memory.scratch).map_err(|_| Failure("a model file is refused"))?;
     let network = model.network().ok_or(Failure("a model file has no network"))?;
-    let (mut row, mut result) = ([0.0; MAX_FEATURES], [0.0; MAX_OUTPUTS]);
+    let (mut row, mut result) = ([0.0; MAX_FEATURES], [0.0; DEFAULT_OUTPUTS]);
     let (Some(row), Some(result)) = (row.get_mut(..inputs), result.get_mut(..results)) else { return Err(TOO_LARGE) };
     for _ in 0..rows {
         let words = memory.inputs.get_mut(..inputs).ok_or(TOO_LARGE)?;
