@@ -143,8 +143,8 @@ impl Collect {
                 rehearse(&closed_loop, asked, dither, first).with_context(|| format!("{index}-{kind}"))?;
             if share < 1.0 {
                 invocation.console.note(&format!(
-                    "{index}-{kind}: flown at {:.2} m/s instead of {:.2}: beyond it the loop's error grows faster than what it is \
-                     asked ({in_rehearsal} of its rehearsals were lost)",
+                    "{index}-{kind}: flown at {:.2} m/s instead of {:.2}: beyond it the loop's error grows faster than what it \
+                     is asked ({in_rehearsal} of its rehearsals were lost)",
                     flights.max_speed, asked.max_speed
                 ));
             }

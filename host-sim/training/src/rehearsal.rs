@@ -1,8 +1,8 @@
 //! Training flights are rehearsed: flown small first, then larger, as long as the loop follows as before.
 //!
-//! *in* a simulated loop and flights that are asked for; *out* the same flights, as large as the loop was seen to survive; *never*
-//! a flight that was not flown smaller before, but for those behind the first two dozen of a set; *source* a loop that is linear leaves an error
-//! in proportion to what it is asked for, one whose motors saturate leaves more.
+//! *in* a simulated loop and flights that are asked for; *out* the same flights, as large as the loop was seen to survive;
+//! *never* a flight that was not flown smaller before, but for those behind the first two dozen of a set; *source* a loop that is
+//! linear leaves an error in proportion to what it is asked for, one whose motors saturate leaves more.
 
 use impromptu_sim::{
     flight_log::FlightLog,
@@ -16,8 +16,8 @@ use crate::recipe::{FlightSet, Signal};
 const REHEARSED: u32 = 24;
 /// By how much more is flown from step to step.
 const STEP: f64 = 1.07;
-/// Steps below what is asked for at which is begun, half of it; a loop that does not follow there begins so many steps lower, down
-/// to a fifteenth: less is not worth a flight.
+/// Steps below what is asked for at which is begun, half of it; a loop that does not follow there begins so many steps lower,
+/// down to a fifteenth: less is not worth a flight.
 const STEPS: i32 = 10;
 /// A flight's RMS and largest error may be so many times what a linear loop would make of those of the step before.
 const GROWTH: [f64; 2] = [1.08, 1.15];

@@ -115,14 +115,14 @@ fn text(summary: &Summary, name: &str) -> String {
         None => writeln!(text, "{minutes:.1} min so far: another flight pays, of the axes of which nothing is known."),
         Some(gain) if known.pays => writeln!(
             text,
-            "{minutes:.1} min so far: as much flight again takes {} % off the error of the axis that is known least: it pays (above \
-             {PAYS_PERCENT} %).",
+            "{minutes:.1} min so far: as much flight again takes {} % off the error of the axis that is known least: it pays \
+             (above {PAYS_PERCENT} %).",
             digits(gain)
         ),
         Some(gain) => writeln!(
             text,
-            "{minutes:.1} min so far: as much flight again takes {} % off the error of the axis that is known least: more flights do \
-             not pay (below {PAYS_PERCENT} %).",
+            "{minutes:.1} min so far: as much flight again takes {} % off the error of the axis that is known least: more flights \
+             do not pay (below {PAYS_PERCENT} %).",
             digits(gain)
         ),
     };
