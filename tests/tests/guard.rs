@@ -126,7 +126,7 @@ fn an_aggressive_feedback_lane_in_a_late_loop_is_handed_over_in_time() {
     let trajectories = strokes(SEED, 12, 1.0, closed_loop.rate_hz()).expect("strokes");
     let one = strokes(SEED, 1, 1.0, closed_loop.rate_hz()).expect("a stroke");
     let validation = Validation { closed_loop: &closed_loop, trajectories: one, seed: SEED };
-    let recipe = Recipe::default().lane;
+    let recipe = Recipe::long().lane;
     let logs = dithered_logs(&recipe, &closed_loop, SEED).expect("logs");
     let (description, network) = parts("crazyflie", "rough");
     let model = |description: &Description| encode(description, Some(&network), Precision::Float, &[]);

@@ -30,7 +30,7 @@ const MISSED: [&str; 2] = ["thrust -9 % at 1.7x, after 30 s: worst", "200 drawn 
 /// without from the first one on, and the README tells what is found.
 #[test]
 fn every_row_keeps_its_bound_and_nothing_is_harmed() {
-    let settings = Settings { seed: 1, strokes: 30, recipe: Recipe::default(), models: true };
+    let settings = Settings { seed: 1, strokes: 30, recipe: Recipe::long(), models: true };
     let found = run(&settings, "", &Silent).unwrap();
     let missed: Vec<String> = found
         .study

@@ -110,6 +110,7 @@ pub fn run(settings: &DemoSettings, observer: &dyn Observer) -> anyhow::Result<R
             let begin = Instant::now();
             let built = build(&settings.recipe, closed_loop, *seed, &mut |_| advance(1)).with_context(|| name.clone())?;
             let trained = begin.elapsed().as_secs_f64();
+            observer.stage(&format!("{name}: trained on {}", built.flown));
             if !built.learned.broken.is_empty() {
                 observer.stage(&format!("{name}: {} training flights broke down, left out", built.learned.broken.len()));
             }

@@ -202,6 +202,7 @@ pub fn model_card(built: &Built, closed_loop: &Loop) -> Result<ModelCard, Export
             Ok(choice) => LaneOutcome::Chosen(choice.design.clone()),
             Err(reason) => LaneOutcome::Refused(reason.to_string()),
         },
+        minutes: Some(built.flown.minutes()),
         quantisation_rms_mm: Some(1e3 * square.sqrt()),
     })
 }

@@ -19,6 +19,8 @@
 //! | 4 | `machines` | loops to try it on |
 //! | 4 | `window`, `candidates` | the network lane; designs of the feedback lane |
 //! | 5 | `design`, `prepared` | the choice of a feedback lane; logs made ready |
+//! | 6 | `next` | what the logs lack |
+//! | 7 | `next_flight` | the trajectory that tells most of it |
 //! | 6 | `complete`, `model` | lane and monitor beside a network lane; what a model says of itself |
 //! | 7 | `training` | from logs to a model file |
 
@@ -33,6 +35,8 @@ pub mod layout;
 pub mod machines;
 pub mod model;
 pub mod models;
+pub mod next;
+pub mod next_flight;
 pub mod prepared;
 pub mod reading;
 pub mod replay;

@@ -125,6 +125,7 @@ fn card(condition: &str) -> ModelCard {
         } else {
             LaneOutcome::Chosen("control weight 3e-3, e_v 0.05 s², noise x1, fast clamp 0.05 m".to_owned())
         },
+        minutes: Some(11.5),
         quantisation_rms_mm: Some(0.241),
     }
 }

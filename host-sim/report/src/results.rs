@@ -130,6 +130,9 @@ pub struct ModelCard {
     pub margins: Option<Margins>,
     /// The feedback lane's design, or why there is none.
     pub lane: LaneOutcome,
+    /// Flight that it was trained on, minutes; `None` where nobody counted.
+    #[serde(default)]
+    pub minutes: Option<f64>,
     /// RMS difference between the quantised and the float network's corrections over a data set, in millimetres.
     pub quantisation_rms_mm: Option<f64>,
 }

@@ -1,13 +1,23 @@
 //! `host-sim collect`: flights of the baseline as CSV logs.
 
-use anyhow::{Result, bail};
+mod next;
+
+use std::path::PathBuf;
+
+use anyhow::{Context as _, Result, bail};
 use clap::{Args, ValueEnum};
 use impromptu_sim::{flight_log::FlightLog, rollout::Dither};
-use impromptu_training::{FlightSet, Purpose, Recipe, Signal, files::write_log, observer::Observer as _};
+use impromptu_training::{
+    FlightSet, Purpose, Recipe, Signal,
+    files::write_log,
+    observer::Observer as _,
+    rehearsal::{Rehearsed, lost, rehearse},
+};
 use serde::Serialize;
 
 use super::{
     Invocation,
+    log_reading::LogReading,
     output::table,
     situation::{Situation, within},
 };
@@ -20,11 +30,12 @@ const FLIGHTS: u32 = 20;
 #[command(after_help = "\
 Writes a CSV file for each flight into --out, with the columns that `train --help` lists. Without --signal the recipe decides what
 is flown ([recipe] of --config). With --dither, random steps on the position reference excite the loop independently: what
-the feedback lane is identified from.
+the feedback lane is identified from. All flights are rehearsed smaller first, and flown as large as the loop was seen to follow.
 
 Examples:
   host-sim collect --condition lab --out logs
   host-sim collect --condition lab --dither 0.01 --out dithered
+  host-sim collect --next --log logs/*.csv --out next
   host-sim collect --vehicle hummingbird --gains soft --signal multisine spline --flights 4 --seconds 90 --out logs")]
 pub(super) struct Collect {
     #[command(flatten)]
@@ -41,6 +52,19 @@ pub(super) struct Collect {
     /// Random steps on the position reference, this high, m (0.01 is usual).
     #[arg(long, value_name = "M", value_parser = metres)]
     dither: Option<f64>,
+    /// Flies nothing: says what the logs of --log lack, whether another flight pays, and writes the one that tells most, no
+    /// larger, faster or harder than they were, into --out.
+    #[arg(long, requires = "log")]
+    #[arg(conflicts_with_all = ["vehicle", "gains", "controller", "condition", "signal", "flights", "seconds", "dither"])]
+    next: bool,
+    /// With --next: logs so far.
+    #[arg(long, value_name = "FILE.csv", num_args = 1.., requires = "next")]
+    log: Vec<PathBuf>,
+    /// With --next: loop of the logs, `quadrotor` or a description (`host-sim describe` drafts one).
+    #[arg(long = "loop", value_name = "NAME|FILE.toml", default_value = "quadrotor", requires = "next")]
+    described: String,
+    #[command(flatten)]
+    reading: LogReading,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -75,7 +99,11 @@ fn metres(text: &str) -> Result<f64, String> {
 #[derive(Debug, Serialize)]
 struct Collected {
     seed: u64,
+    /// Length of all logs, minutes.
+    minutes: f64,
     logs: Vec<Log>,
+    /// Trajectories in which the vehicle was lost: there is no log of them.
+    lost: Vec<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -92,6 +120,9 @@ impl Collect {
     }
 
     pub(super) fn run(self, invocation: &Invocation) -> Result<()> {
+        if self.next {
+            return next::run(&self.log, &self.described, self.reading, invocation);
+        }
         let closed_loop = self.situation.closed_loop()?;
         let recipe = invocation.configuration.recipe();
         let training_flights = self.training_flights(recipe);
@@ -105,21 +136,39 @@ impl Collect {
         let purpose = if dither.is_some() { Purpose::Identification } else { Purpose::Training };
         let mut first = invocation.configuration.seed_of(purpose);
         let mut logs = Vec::new();
-        for (index, flight_set) in (1..).zip(&training_flights) {
-            let flown = closed_loop.collect(&flight_set.motions(first), dither, first)?;
+        let mut lost_flights = Vec::new();
+        for (index, asked) in (1..).zip(&training_flights) {
+            let kind = name(asked.signal);
+            let Rehearsed { flights, share, largest_error, lost: in_rehearsal } =
+                rehearse(&closed_loop, asked, dither, first).with_context(|| format!("{index}-{kind}"))?;
+            if share < 1.0 {
+                invocation.console.note(&format!(
+                    "{index}-{kind}: flown at {:.2} m/s instead of {:.2}: beyond it the loop's error grows faster than what it \
+                     is asked ({in_rehearsal} of its rehearsals were lost)",
+                    flights.max_speed, asked.max_speed
+                ));
+            }
+            let flown = closed_loop.collect(&flights.motions(first), dither, first)?;
             for (flight, log) in (1..).zip(&flown) {
-                let kind = name(flight_set.signal);
+                if lost(log, largest_error) {
+                    invocation
+                        .console
+                        .note(&format!("{index}-{kind}-{flight:04}: the vehicle was lost; no log of it is written"));
+                    lost_flights.push(log.name.clone());
+                    continue;
+                }
                 let dithered = if dither.is_some() { "-dithered" } else { "" };
                 let file = folder.join(format!("{index}-{kind}{dithered}-{flight:04}.csv"));
                 invocation.check_output(&file, self.situation.files())?;
                 write_log(log, &file)?;
                 logs.push(entry(log, file.display().to_string()));
             }
-            first = first.wrapping_add(u64::from(flight_set.flights));
+            first = first.wrapping_add(u64::from(asked.flights));
             invocation.console.steps(index, training_flights.len() as u64);
         }
         invocation.console.finish();
-        let collected = Collected { seed, logs };
+        let minutes = logs.iter().map(|log| log.seconds).sum::<f64>() / 60.0;
+        let collected = Collected { seed, minutes, logs, lost: lost_flights };
         invocation.format.print(&collected, || text(&collected))
     }
 
@@ -163,5 +212,6 @@ fn entry(log: &FlightLog, file: String) -> Log {
 
 fn text(collected: &Collected) -> String {
     let rows = collected.logs.iter().map(|log| [log.file.clone(), log.trajectory.clone(), format!("{:.1}", log.seconds)]);
-    table(["log", "trajectory", "seconds"], 2, rows)
+    let sum = ["together".to_owned(), format!("{:.1} min", collected.minutes), String::new()];
+    table(["log", "trajectory", "seconds"], 2, rows.chain([sum]))
 }

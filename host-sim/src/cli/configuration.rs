@@ -13,6 +13,8 @@ use serde::de::DeserializeOwned;
 pub(super) struct Configuration {
     /// The demo's settings: file, then options.
     pub(super) settings: DemoSettings,
+    /// Whether they are those of a file.
+    from_file: bool,
 }
 
 impl Configuration {
@@ -21,12 +23,17 @@ impl Configuration {
         let mut settings: DemoSettings = file.map(checked).transpose()?.unwrap_or_default();
         settings.seed = seed.unwrap_or(settings.seed);
         settings.out = out.or(settings.out);
-        Ok(Self { settings })
+        Ok(Self { settings, from_file: file.is_some() })
     }
 
     /// Recipe of the models.
     pub(super) fn recipe(&self) -> &Recipe {
         &self.settings.recipe
+    }
+
+    /// Recipe of the models of a study: the file's, or the long one, by whose models studies are compared.
+    pub(super) fn study_recipe(&self) -> Recipe {
+        if self.from_file { self.settings.recipe.clone() } else { Recipe::long() }
     }
 
     /// Seed of the run.

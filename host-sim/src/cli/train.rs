@@ -1,6 +1,6 @@
 //! `host-sim train`: flight logs to a model.
 
-mod any_loop;
+pub(super) mod any_loop;
 mod columns;
 
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ use impromptu_training::{
     files::model_files,
     in_words,
     learn::few_rows,
-    learned_in_flight,
+    learned_in_flight, minutes,
     observer::Observer as _,
     smoothing,
     supervised::Progress,
@@ -227,7 +227,7 @@ impl Train {
         let overridden = self.overridden(invocation, recipe, &learned, gates.overridden, rate_hz);
         let identification = if dithered.is_empty() { &logs } else { &dithered };
         let others = self.dithered.iter().zip(&dithered).filter(|(path, _)| !self.log.contains(path)).map(|(_, log)| log);
-        let minutes = logs.iter().chain(others).map(|log| log.rows.len() as f64 / log.rate_hz).sum::<f64>() / 60.0;
+        let minutes = minutes(&logs) + others.map(|log| minutes(std::slice::from_ref(log))).sum::<f64>();
         let remark =
             Vec::from_iter([Some(format!("{minutes:.1} min of flight")), overridden.clone()].into_iter().flatten()).join("; ");
         let (trained, fits) = match origin.closed_loop {

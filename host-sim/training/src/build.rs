@@ -33,6 +33,35 @@ pub struct Built {
     pub feedforward_lane: Option<LaneChoice>,
     /// Model files.
     pub models: ModelSet,
+    /// What was flown to learn from.
+    pub flown: Flown,
+}
+
+/// Flight that was learned from, minutes. The simulated flights that judge candidates teach nothing and are not counted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Flown {
+    /// For the networks.
+    pub training: f64,
+    /// With dither, for the feedback lane.
+    pub dithered: f64,
+}
+
+impl Flown {
+    /// Both together.
+    pub fn minutes(&self) -> f64 {
+        self.training + self.dithered
+    }
+}
+
+impl std::fmt::Display for Flown {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(out, "{:.1} min of flight, {:.1} of them with dither", self.minutes(), self.dithered)
+    }
+}
+
+/// Length of logs together, minutes.
+pub fn minutes(logs: &[FlightLog]) -> f64 {
+    logs.iter().map(|log| log.rows.len() as f64 / log.rate_hz).sum::<f64>() / 60.0
 }
 
 /// The models that an experiment compares, as the bytes of model files.
@@ -73,9 +102,10 @@ pub fn build(recipe: &Recipe, closed_loop: &Loop, seed: u64, progress: &mut dyn 
     let pipeline = Pipeline::simulated(recipe, closed_loop, seed)?;
     let logs = training_logs(recipe, closed_loop, seed)?;
     let learned = pipeline.learn(&logs, progress)?;
-    drop(logs);
     let dithered = dithered_logs(&recipe.lane, closed_loop, derived(seed, Purpose::Identification))?;
-    let trained = pipeline.complete(&learned, &dithered, &name("net_int8"), None)?;
+    let flown = Flown { training: minutes(&logs), dithered: minutes(&dithered) };
+    drop(logs);
+    let trained = pipeline.complete(&learned, &dithered, &name("net_int8"), Some(&flown.to_string()))?;
     let (feedforward_lane, feedforward) =
         comparison(&pipeline, closed_loop, &learned, &dithered, &trained, &name("feedforward"))?;
 
@@ -91,7 +121,7 @@ pub fn build(recipe: &Recipe, closed_loop: &Loop, seed: u64, progress: &mut dyn 
         int8: model,
         description,
     };
-    Ok(Built { learned, lane, feedforward_lane, models })
+    Ok(Built { learned, lane, feedforward_lane, models, flown })
 }
 
 /// The flatness feed-forward with a feedback lane and a monitor of its own, if there are any.

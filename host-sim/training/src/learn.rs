@@ -14,6 +14,7 @@ use crate::{
     hold_out::split,
     recipe::Recipe,
     supervised::{Dataset, DatasetError, Progress, Ridge, RidgeError, TrainingError, TrainingSettings, fine_tune, train},
+    turned::quarter_turns,
 };
 
 /// Why nothing was learned.
@@ -178,7 +179,7 @@ pub struct Rows {
     pub label_range: [f32; REFERENCE],
     /// CRC-32 of all rows.
     pub data_crc: u32,
-    /// Number of rows.
+    /// Number of rows that were flown, each counted once.
     pub count: usize,
 }
 
@@ -216,15 +217,28 @@ pub fn learn(
         let settings = ExampleSettings { measurement_delay_s, smoothing_s, divisor: recipe.divisor, stride: recipe.stride };
         labels.examples(logs, &recipe.features(), &settings)
     };
-    let (training, held_out) = split(&logs);
-    let (training, validation) = (examples(&training)?, examples(&held_out)?);
+    let (training_logs, held_out) = split(&logs);
+    let (mut training, validation) = (examples(&training_logs)?, examples(&held_out)?);
+    let flown = training.rows();
     if !settings.keep_few
-        && let Some(few) = few_rows(recipe, training.rows(), validation.rows(), logs[0].rate_hz)
+        && let Some(few) = few_rows(recipe, flown, validation.rows(), logs[0].rate_hz)
     {
         return Err(few);
     }
-    let rows = Rows::of(&training);
-    let ridge = Ridge::fit(&training, recipe.ridge_penalty)?.to_network();
+    let mut ridge = Ridge::fit(&training, recipe.ridge_penalty)?.to_network();
+    if recipe.turned {
+        let turns: Vec<FlightLog> = training_logs.iter().flat_map(|log| quarter_turns(log)).collect();
+        let with_turns = examples(&training_logs.iter().copied().chain(&turns).collect::<Vec<_>>())?;
+        let ridges = [ridge, Ridge::fit(&with_turns, recipe.ridge_penalty)?.to_network()];
+        // A vehicle that does not answer alike along x and y is answered worse with turns.
+        let better = best_on_rows(&ridges, &validation);
+        if better == 1 {
+            training = with_turns;
+        }
+        let [plain, turned] = ridges;
+        ridge = if better == 1 { turned } else { plain };
+    }
+    let rows = Rows { count: flown, ..Rows::of(&training) };
     let mut candidates = Vec::new();
     for &weight_decay in &recipe.weight_decays {
         let settings = TrainingSettings { weight_decay, ..recipe.network.clone() };

@@ -22,12 +22,14 @@
 //! | 1 | `supervised`, `bypass` | rows to networks; inputs past a network |
 //! | 1 | `feedback_design` | identification and design of the feedback lane |
 //! | 1 | `channel`, `breakdown`, `hold_out` | channels of logs; flights that teach nothing; logs that are held out |
+//! | 1 | `turned` | flights turned about the vertical |
 //! | 1 | `purpose`, `observer` | seeds; who watches |
 //! | 1 | `coverage` | trajectories beside what was trained on |
 //! | 2 | `examples`, `gates` | rows of features from logs; the diagnosis before a training |
 //! | 2 | `track` | axes of the logs of any loop, for a replay |
 //! | 2 | `recipe` | everything that decides, as data |
 //! | 3 | `learn` | logs to networks |
+//! | 3 | `rehearsal` | training flights that a loop survives |
 //! | 4 | `error`, `files`, `models` | why there are no models; files written whole; descriptions |
 //! | 4 | `flown` | what was learned in flight as a network |
 //! | 5 | `validation`, `lane_choice` | flights that judge; what comes of the choice of a lane |
@@ -58,12 +60,14 @@ pub mod observer;
 pub mod pipeline;
 pub mod purpose;
 pub mod recipe;
+pub mod rehearsal;
 pub mod supervised;
 pub mod track;
+pub mod turned;
 pub mod validation;
 
 pub use breakdown::{Breakdown, largest_sound_error};
-pub use build::{Built, ModelSet, build, training_logs};
+pub use build::{Built, Flown, ModelSet, build, minutes, training_logs};
 pub use bypass::Bypass;
 pub use error::BuildError;
 pub use examples::Labels;

@@ -131,8 +131,8 @@ impl Default for LaneRecipe {
         Self {
             dithered_flights: FlightSet {
                 signal: Signal::Multisine,
-                flights: 10,
-                seconds: 90.0,
+                flights: 4,
+                seconds: 60.0,
                 max_speed: 1.5,
                 max_acceleration: 5.0,
                 shortest_s: 0.5,
@@ -177,6 +177,10 @@ pub struct Recipe {
     /// Zero-phase smoothing of logs with noise, s.
     #[garde(custom(within(0.0, 2.0)))]
     pub smoothing_s: f64,
+    /// Whether each training flight counts three times more, turned about the vertical by 90°, 180° and 270°, if the logs held
+    /// out are answered better so: vehicles answer alike along x and y.
+    #[garde(skip)]
+    pub turned: bool,
     /// Every how many reference ticks a training row is taken.
     #[garde(custom(counted(1, 10_000)))]
     pub stride: usize,
@@ -210,17 +214,51 @@ pub struct Recipe {
     pub validation_speeds: Vec<f64>,
 }
 
+/// Strokes as many times as fast as the test's. They are as long as they are; their acceleration follows from the speed.
+fn strokes(speed: f64, flights: u32) -> FlightSet {
+    FlightSet {
+        signal: Signal::Strokes,
+        flights,
+        seconds: 0.0,
+        max_speed: speed * STROKE_SPEED,
+        max_acceleration: speed * speed * STROKE_ACCELERATION,
+        shortest_s: 0.0,
+    }
+}
+
 impl Default for Recipe {
+    /// That of the main job: at most 12 minutes of flight.
     fn default() -> Self {
-        // Strokes are as long as they are; their acceleration follows from the speed.
-        let strokes = |speed: f64, flights: u32| FlightSet {
-            signal: Signal::Strokes,
-            flights,
-            seconds: 0.0,
-            max_speed: speed * STROKE_SPEED,
-            max_acceleration: speed * speed * STROKE_ACCELERATION,
-            shortest_s: 0.0,
-        };
+        Self {
+            turned: true,
+            // At 2x one flight in twelve is lost. What strokes fill of the training box, three quarters of a minute of fast tones
+            // fill as well: without them the guard hands over at 1.7x.
+            training_flights: vec![
+                strokes(1.0, 8),
+                strokes(1.35, 6),
+                strokes(1.7, 12),
+                strokes(1.85, 6),
+                FlightSet {
+                    signal: Signal::Multisine,
+                    flights: 1,
+                    seconds: 45.0,
+                    max_speed: 2.4,
+                    max_acceleration: 8.0,
+                    shortest_s: 0.8,
+                },
+            ],
+            lane: LaneRecipe::default(),
+            validation_strokes: 8,
+            ..Self::long()
+        }
+    }
+}
+
+impl Recipe {
+    /// The long recipe, `recipes/long.toml`: four hours of flight.
+    pub fn long() -> Self {
+        let usual = LaneRecipe::default();
+        let dithered_flights = FlightSet { flights: 10, seconds: 90.0, ..usual.dithered_flights };
         Self {
             features: None,
             window: [-20, 40],
@@ -229,6 +267,7 @@ impl Default for Recipe {
             interpolation: Interpolation::Linear,
             fade_s: 0.5,
             smoothing_s: 0.06,
+            turned: false,
             stride: 5,
             // What the baseline flies is slower than what it is asked for: to learn how 1.7x is flown, ask for 2x.
             training_flights: vec![strokes(1.0, 300), strokes(1.35, 300), strokes(1.7, 300), strokes(2.0, 200)],
@@ -242,14 +281,12 @@ impl Default for Recipe {
                 quantisation: Some(FakeQuantisation::default()),
                 ..TrainingSettings::default()
             },
-            lane: LaneRecipe::default(),
+            lane: LaneRecipe { dithered_flights, ..usual },
             validation_strokes: 12,
             validation_speeds: vec![1.0, 1.7],
         }
     }
-}
 
-impl Recipe {
     /// The network's inputs: those given, or desired positions over the window, relative to the present one.
     pub fn features(&self) -> Vec<Feature> {
         if let Some(features) = &self.features {
@@ -328,48 +365,4 @@ fn designable(settings: &DesignSettings, _: &()) -> garde::Result {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_no_training_can_use_is_refused_with_value_and_range() {
-        Recipe::default().validate().unwrap();
-        for (text, refusal) in [
-            ("window_step = 0", "window_step: 0 is not from 1 to 1000"),
-            ("fade_s = 1e12", "fade_s: 1000000000000 is not from 0 to 60"),
-            ("smoothing_s = nan", "smoothing_s: NaN is not from 0 to 2"),
-            ("validation_speeds = [0.0]", "validation_speeds[0]: 0 is not from 0.05 to 20"),
-            ("[network]\nhidden = [1000000]", "network: training setting `hidden` is [1000000]"),
-            ("[network]\nepochs = 1000000000000", "network: training setting `epochs` is 1000000000000"),
-            ("[lane.design]\nlags = 1000000", "lane.design: `lags` is 1000000"),
-            ("[lane]\ndither = 1e308", "lane.dither: "),
-        ] {
-            let recipe: Recipe = toml::from_str(text).unwrap();
-            let message = recipe.validate().expect_err(text).to_string();
-            assert!(message.contains(refusal), "{text}: {message}");
-        }
-        for (change, refusal) in [
-            ("shortest_s = 0.0", "shortest_s: 0 is not from 0.05 to 10"),
-            ("seconds = 0.0", "seconds: 0 is not from 6 to 3590"),
-            ("seconds = 1e12", "seconds: 1000000000000 is not from 6 to 3590"),
-            ("flights = 4000000000", "flights: 4000000000 is not from 1 to 3000"),
-            ("flights = 3000", "seconds: 3000 flights of 90 s are 270000 s"),
-            ("max_speed = 0.0", "max_speed: 0 is not from 0.01 to 50"),
-        ] {
-            let usual = [
-                "signal = \"multisine\"",
-                "flights = 2",
-                "seconds = 90.0",
-                "max_speed = 1.5",
-                "max_acceleration = 5.0",
-                "shortest_s = 0.5",
-            ];
-            let key = change.split(' ').next().unwrap();
-            let lines: Vec<&str> =
-                usual.iter().map(|line| if line.starts_with(&format!("{key} ")) { change } else { line }).collect();
-            let recipe: Recipe = toml::from_str(&format!("[[training_flights]]\n{}", lines.join("\n"))).unwrap();
-            let message = recipe.validate().expect_err(change).to_string();
-            assert!(message.contains(&format!("training_flights[0].{refusal}")), "{change}: {message}");
-        }
-    }
-}
+mod tests;

@@ -44,7 +44,9 @@ pub(super) fn models(models: &[ModelCard]) -> Markup {
                     @for model in models {
                         dt { (model.name) }
                         dd {
-                            "Trained on " (model.vehicle) ", " (model.gains) " gains, " (model.condition) ". "
+                            "Trained on "
+                            @if let Some(minutes) = model.minutes { (fixed(minutes, 1)) " min of flight of " }
+                            (model.vehicle) ", " (model.gains) " gains, " (model.condition) ". "
                             @match &model.lane {
                                 LaneOutcome::Chosen(design) => { "Feedback lane: " (design) "." }
                                 LaneOutcome::Refused(reason) => { span.worse { "No feedback lane: " (reason) "." } }

@@ -97,7 +97,7 @@ impl Crazyflie {
                 },
                 weight_decays: vec![0.1],
                 validation_strokes: settings.validation,
-                ..Recipe::default()
+                ..Recipe::long()
             },
             clean,
             lab,

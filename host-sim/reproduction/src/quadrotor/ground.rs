@@ -68,7 +68,7 @@ impl<'a> Ground<'a> {
                 seed: self.settings.seed,
                 ..TrainingSettings::default()
             },
-            ..Recipe::default()
+            ..Recipe::long()
         }
     }
 }

@@ -192,7 +192,7 @@ mod tests {
     #[test]
     fn windows_span_the_same_time_at_every_rate_and_fit_the_preview() {
         for divisor in DIVISORS {
-            let recipe = windowed(&Recipe::default(), divisor, WINDOW[1]);
+            let recipe = windowed(&Recipe::long(), divisor, WINDOW[1]);
             let span = (recipe.window[1] + 1 - recipe.window[0]) * divisor as i16;
             assert!(span < PREVIEW as i16 && recipe.window[0] < 0 && recipe.window[1] > 0);
             assert!(recipe.features().len() <= impromptu_firmware::model::MAX_FEATURES);

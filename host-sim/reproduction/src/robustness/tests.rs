@@ -29,7 +29,7 @@ impl Observer for Silent {
 
 /// Few flights, few epochs, one lane to choose from.
 fn small() -> Recipe {
-    let full = Recipe::default();
+    let full = Recipe::long();
     Recipe {
         training_flights: full.training_flights.iter().map(|of| FlightSet { flights: 30, ..*of }).collect(),
         network: TrainingSettings { epochs: 8, ..full.network },
@@ -116,7 +116,7 @@ fn the_study_tells_every_case_deviation_vehicle_and_control_weight() {
 /// A model that needs no training: flatness feed-forward.
 fn model(closed_loop: &Loop) -> Vec<u8> {
     let rows = Rows { calibration: Vec::new(), envelope: Vec::new(), label_range: [1.0; 6], data_crc: 0, count: 0 };
-    let description = describe(&Recipe::default(), closed_loop, &rows, None, "flatness", "", 1);
+    let description = describe(&Recipe::long(), closed_loop, &rows, None, "flatness", "", 1);
     feedforward(&closed_loop.settings, description).unwrap()
 }
 

@@ -40,7 +40,7 @@ fn what_is_predicted_for_a_vehicle_is_what_it_then_flies() {
 fn predicted_and_flown(vehicle: &str, condition: &str, seed: u64) -> [(Interval, f64); 3] {
     let closed_loop = closed_loop(vehicle, "stock", condition).unwrap();
     let age_s = closed_loop.condition.measurement_delay_s;
-    let recipe = Recipe::default();
+    let recipe = Recipe::long();
     let logs = Test::Multisine.fly(&closed_loop, &recipe, 100 * seed).unwrap();
     let settings = Settings { seed, ..Settings::default() };
     let records: [Record; 3] = std::array::from_fn(|axis| of_logs(&logs, axis, age_s).unwrap());

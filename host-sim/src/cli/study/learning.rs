@@ -42,7 +42,7 @@ impl Learning {
         let settings = Settings {
             seed: invocation.configuration.seed(),
             strokes: self.strokes as usize,
-            recipe: invocation.configuration.recipe().clone(),
+            recipe: invocation.configuration.study_recipe(),
             models: !self.from_nothing,
         };
         let found = run(&settings, &invocation.command, &invocation.console)?;

@@ -97,7 +97,7 @@ impl Robustness {
             draw_strokes: self.draw.draw_strokes as usize,
             guard_flights: self.guard_flights,
             ranges: self.draw.ranges()?,
-            recipe: invocation.configuration.recipe().clone(),
+            recipe: invocation.configuration.study_recipe(),
             out: invocation.configuration.folder()?,
         };
         let study = run(&settings, &invocation.command, &invocation.console)?;
@@ -139,7 +139,7 @@ impl Draws {
         let seed = invocation.configuration.seed();
         let bytes = match &self.model {
             Some(path) => ModelFile::read(path)?.bytes().to_vec(),
-            None => build(invocation.configuration.recipe(), &closed_loop, seed, &mut |_| {})?.models.int8,
+            None => build(&invocation.configuration.study_recipe(), &closed_loop, seed, &mut |_| {})?.models.int8,
         };
         let model = Model::from_bytes(&bytes).with_context(|| match &self.model {
             Some(path) => format!("{}: refused", path.display()),
