@@ -29,10 +29,10 @@ the loop learns in flight from nothing, and on top of each model with both lanes
 against the baseline's flight of the same stroke: mean and worst over the strokes.
 
 Examples:
+  host-sim evaluate --learn 10 --controller pid --strokes 5
   host-sim evaluate --model models/model.impromptu
   host-sim evaluate --model a.impromptu --model b.impromptu --condition rough --speed 1,1.7 --format json
-  host-sim evaluate --model models/model.impromptu --extra-delay-ms 20 --seed 5
-  host-sim evaluate --learn 60 --controller pid")]
+  host-sim evaluate --model models/model.impromptu --extra-delay-ms 20 --seed 5")]
 pub(super) struct Evaluate {
     /// Model files.
     #[arg(long, value_name = "FILE", required_unless_present = "learn", num_args = 1..)]

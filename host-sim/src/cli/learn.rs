@@ -52,6 +52,7 @@ Written into --out: learn.html, a page with a figure in which the predicted erro
 was learned of all of them, for a learner of the same axes (`model-export inspect learn.learned`).
 
 Examples:
+  host-sim learn --log host-sim/reproduction/data/nanobench/*.csv
   host-sim learn --log monday.csv tuesday.csv wednesday.csv
   host-sim learn --log flights/*.csv --axis x y --format json
   host-sim learn --log run*.csv --columns t,setpoint,angle,speed --frequency 8 --damping 0.7 --delay-ms 20")]
@@ -130,7 +131,8 @@ impl Learn {
         let study = replayed.study(invocation.configuration.seed(), &invocation.command);
         write_page(&render_study(&study)?, &page)?;
         replace(&state, &learned).with_context(|| state.display().to_string())?;
-        invocation.console.note(&format!("figure: {}\nlearned: {}", page.display(), state.display()));
+        invocation.console.note(&format!("figure: {}", page.display()));
+        invocation.console.note(&format!("learned: {}", state.display()));
         invocation.format.print(&replayed, || replayed.text())
     }
 

@@ -8,6 +8,7 @@ mod configuration;
 mod demo;
 mod describe;
 mod diagnose;
+mod doctor;
 mod evaluate;
 mod fly;
 mod learn;
@@ -19,6 +20,7 @@ mod output;
 mod processor;
 mod progress;
 mod report;
+mod shell;
 mod situation;
 mod study;
 mod train;
@@ -124,6 +126,12 @@ enum Command {
     Study(study::Study),
     /// Writes a trajectory as CSV, or lists the known ones.
     Trajectory(trajectory::TrajectoryCommand),
+    /// Says which tools are installed, which are missing, what for, and how to get them.
+    Doctor(doctor::Doctor),
+    /// Prints a script with which a shell completes the commands.
+    Completions(shell::Completions),
+    /// Writes the pages of `man`.
+    Manual(shell::Manual),
 }
 
 impl Command {
@@ -135,9 +143,7 @@ impl Command {
             Self::Fly(command) => command.conflict(),
             Self::Evaluate(command) => command.conflict(),
             Self::Study(command) => command.conflict(),
-            Self::Describe(_) | Self::Diagnose(_) | Self::Learn(_) | Self::Machine(_) | Self::Report(_) | Self::Trajectory(_) => {
-                None
-            }
+            _ => None,
         }
     }
 }
@@ -230,6 +236,9 @@ fn execute(arguments: Arguments, console: &Console, command: String) -> Result<(
         Some(Command::Report(command)) => command.run(&invocation),
         Some(Command::Study(command)) => command.run(&invocation),
         Some(Command::Trajectory(command)) => command.run(&invocation),
+        Some(Command::Doctor(command)) => command.run(&invocation),
+        Some(Command::Completions(command)) => command.run(),
+        Some(Command::Manual(command)) => command.run(&invocation),
     }
 }
 

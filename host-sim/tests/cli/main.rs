@@ -4,6 +4,7 @@ mod demo;
 mod diagnose;
 #[cfg(unix)]
 mod files;
+mod help;
 mod learn;
 mod program;
 mod refusals;
