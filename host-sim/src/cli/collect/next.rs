@@ -121,8 +121,8 @@ fn text(summary: &Summary, name: &str) -> String {
         ),
         Some(gain) => writeln!(
             text,
-            "{minutes:.1} min so far: as much flight again takes {} % off the error of the axis that is known least: more flights \
-             do not pay (below {PAYS_PERCENT} %).",
+            "{minutes:.1} min so far: as much flight again takes {} % off the error of the axis that is known least: more \
+             flights do not pay (below {PAYS_PERCENT} %).",
             digits(gain)
         ),
     };
