@@ -33,6 +33,9 @@ pub enum Machine {
     Gimbal,
     /// Six axes with gravity, friction and pulls at their neighbours, 125 Hz.
     Arm,
+    /// One axis, drawn from a seed: 50 to 200 Hz, a position loop of 2 to 20 rad/s with a damping of 0.5 to 1.2, a spring in every
+    /// third, friction, gravity, dead time, disturbance and noise of any size.
+    Drawn(u64),
 }
 
 /// What the axes of a machine are.
@@ -57,6 +60,8 @@ struct Plant {
     /// Dead time of the drive and age of what is measured, s.
     dead_s: f64,
     age_s: f64,
+    /// Disturbance, as a share of what it takes to hold the farthest position.
+    disturbance: f64,
     /// Noise of position and velocity.
     noise: [f64; 2],
     dither: f64,
@@ -78,6 +83,7 @@ impl Machine {
             Self::Gantry => "gantry",
             Self::Gimbal => "gimbal",
             Self::Arm => "arm",
+            Self::Drawn(_) => "drawn",
         }
     }
 
@@ -101,6 +107,7 @@ impl Machine {
             fastest_hz: 1.2,
             dead_s: 0.02,
             age_s: 0.005,
+            disturbance: 2e-3,
             noise: [1e-3, 1e-2],
             dither: 0.02,
         };
@@ -146,6 +153,7 @@ impl Machine {
                 dither: 0.01,
                 ..servo
             },
+            Self::Drawn(seed) => drawn(servo, seed),
         }
     }
 
@@ -163,6 +171,33 @@ impl Machine {
         });
         let axes = axes.collect();
         LoopDescription { name: self.name().into(), time: "time_s".into(), rate_hz: Some(plant.rate_hz), age_ms: None, axes }
+    }
+}
+
+/// A machine of one axis from a seed.
+fn drawn(usual: Plant, seed: u64) -> Plant {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut between = |low: f64, high: f64| low * (high / low).powf(random.random_range(0.0..1.0));
+    let rate_hz = between(50.0, 200.0);
+    let frequency = between(2.0, 20.0f64.min(rate_hz / 7.0));
+    let (far, noise) = (between(0.3, 3.0), between(1e-4, 1e-3));
+    let stiffness = far * frequency * frequency;
+    let spring = seed.is_multiple_of(3);
+    Plant {
+        rate_hz,
+        frequency,
+        damping: between(if spring { 0.7 } else { 0.5 }, 1.2),
+        spring_hz: if spring { between(2.0, 4.0) * frequency / TAU } else { 0.0 },
+        friction: between(2e-3, 4e-2) * stiffness,
+        gravity: between(1e-3, 0.1) * stiffness,
+        far,
+        fastest_hz: between(0.4, 1.2) * frequency / TAU,
+        dead_s: between(0.01, 0.2) / frequency,
+        age_s: between(0.01, 0.2) / frequency,
+        disturbance: between(1e-3, 2e-2),
+        noise: [noise * far, noise * far * frequency],
+        dither: 0.012 * far,
+        ..usual
     }
 }
 
@@ -215,7 +250,7 @@ impl Running {
     fn run(&mut self, references: &[f64]) {
         let h = 1.0 / (self.plant.rate_hz * STEPS as f64);
         let Plant { frequency, damping, spring_hz, friction, gravity, pull, far, .. } = self.plant;
-        let disturbance = 0.02 * far * frequency * frequency * 0.1;
+        let disturbance = self.plant.disturbance * far * frequency * frequency;
         for _ in 0..STEPS {
             let before = self.accelerations.clone();
             for (axis, reference) in references.iter().enumerate() {
@@ -300,7 +335,7 @@ pub fn logged(machine: Machine, desired: &[Vec<f64>], dithered: bool, seed: u64)
             log.reference.push(references[axis]);
             log.measured.push(measured[axis][0]);
             log.velocity.push(measured[axis][1]);
-            let noise = 0.02 * running.plant.far * running.plant.frequency.powi(2) * 0.1 * running.normal();
+            let noise = running.plant.disturbance * running.plant.far * running.plant.frequency.powi(2) * running.normal();
             let acceleration = running.accelerations[axis] + noise;
             log.fresh.get_or_insert_default().push(acceleration);
         }

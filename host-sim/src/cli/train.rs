@@ -13,7 +13,10 @@ use impromptu_flight::flight::Rates;
 use impromptu_loops::complete::AxisFit;
 use impromptu_sim::{controller::Controller, flight_log::FlightLog, flights::Loop};
 use impromptu_training::{
-    AxisGates, LearnError, LearnSettings, Learned, Pipeline, Purpose, Recipe, Trained, Validation, check_gates,
+    AxisGates, LearnError, LearnSettings, Learned, Pipeline, Purpose, Recipe, Trained, Validation,
+    agreement::{Disagreement, agreement},
+    breakdown::sound,
+    check_gates,
     coverage::{Coverage, coverage},
     derived, dithered_logs,
     files::model_files,
@@ -68,7 +71,8 @@ pub(super) struct Train {
     /// Zero-phase smoothing of the logs, ms; 0 for logs without noise [default: the recipe's, 60].
     #[arg(long, value_name = "N", value_parser = milliseconds)]
     smoothing_ms: Option<f64>,
-    /// Vehicle (name or TOML file) for the validation flights on which the feedback lane is chosen; none without it.
+    /// Vehicle (name or TOML file) for the validation flights on which the feedback lane is chosen, in the place of models from
+    /// the logs; refused if it answers the logs' references otherwise than the logs show.
     #[arg(long, value_name = "NAME|FILE.toml")]
     vehicle: Option<String>,
     /// Gains of its position loop.
@@ -146,6 +150,17 @@ fn read(paths: &[PathBuf], rate_hz: f64) -> Result<Vec<FlightLog>> {
     Ok(paths.iter().map(|path| FlightLog::read(path, rate_hz)).collect::<Result<_, _>>()?)
 }
 
+/// The simulated loop is not that of the logs.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "--vehicle {vehicle}: {found}; leave --vehicle out, and both lanes are chosen on what the logs alone leave possible, or give \
+     the vehicle, --gains, --controller and --condition that were flown (--force trains all the same)"
+)]
+pub(super) struct OtherLoop {
+    vehicle: String,
+    found: Disagreement,
+}
+
 /// The logs' loop: what of it is known.
 struct Origin {
     /// The simulated loop of the validation flights.
@@ -211,7 +226,12 @@ impl Train {
         if self.vehicle.is_none() && self.delay_ms.is_none() {
             origin.delay_s = any_loop::age_of_flights(&logs, invocation);
         }
-        let gates = self.pass_gates(invocation, &logs, origin.delay_s, seed)?;
+        let mut gates = self.pass_gates(invocation, &logs, origin.delay_s, seed)?;
+        if let Some(closed_loop) = &origin.closed_loop {
+            let differs = self.compared(invocation, closed_loop, &[&logs, &dithered])?;
+            gates.overridden =
+                Vec::from_iter(gates.overridden.into_iter().chain(differs)).into_iter().reduce(|a, b| a + "; " + &b);
+        }
         invocation.console.stage(&format!("training on {} logs", logs.len()));
         let pipeline = origin.pipeline(recipe, seed, self.force)?;
         let learned = pipeline.learn(&logs, &mut watched(invocation, recipe)).map_err(|error| match error {
@@ -245,16 +265,43 @@ impl Train {
         let (recipe, learned) = learned_in_flight(recipe, &kept, closed_loop.rate_hz(), &motions)
             .with_context(|| format!("--learned {}", path.display()))?;
         invocation.console.stage("designing the feedback lane");
+        let mut differs = None;
         let dithered = match self.dithered.as_slice() {
             [] => dithered_logs(&recipe.lane, closed_loop, derived(seed, Purpose::Identification))?,
-            paths => read(paths, closed_loop.rate_hz())?,
+            paths => {
+                let logs = read(paths, closed_loop.rate_hz())?;
+                differs = self.compared(invocation, closed_loop, &[&logs])?;
+                logs
+            }
         };
         let remark = "network: the preview part of what was learned in flight";
         let trained = origin.pipeline(&recipe, seed, false)?.complete(&learned, &dithered, &self.name, Some(remark))?;
         let learned_s = |kept: Kept<'_>| kept.axes().fold(0.0f32, |most, axis| most.max(axis.learned_s));
         let seconds = Kept::read(&kept).map_or(0.0, learned_s);
         let minutes = f64::from(seconds) / 60.0;
-        Ok(Made { learned, trained, gates: Vec::new(), overridden: None, fits: Vec::new(), minutes })
+        Ok(Made { learned, trained, gates: Vec::new(), overridden: differs, fits: Vec::new(), minutes })
+    }
+
+    /// Refuses a simulated loop that is not that of the logs, or says what --force overrides.
+    fn compared(&self, invocation: &Invocation, closed_loop: &Loop, logs: &[&[FlightLog]]) -> Result<Option<String>> {
+        invocation.console.stage("flying the logs' references with --vehicle");
+        for logs in logs {
+            let (sound, _) = sound(logs);
+            let found = if sound.is_empty() { None } else { agreement(closed_loop, &sound)?.disagreement(closed_loop) };
+            match found {
+                Some(found) if self.force => {
+                    let overridden = format!("--vehicle overridden by --force: {found}");
+                    invocation.console.note(&format!("warning: {overridden}"));
+                    return Ok(Some(overridden));
+                }
+                Some(found) => {
+                    let vehicle = self.vehicle.as_deref().unwrap_or_default();
+                    return Err(anyhow::Error::new(OtherLoop { vehicle: vehicle.into(), found }));
+                }
+                None => {}
+            }
+        }
+        Ok(None)
     }
 
     /// Why the arguments do not go together, if they do not.

@@ -52,6 +52,7 @@ fn asked(machine: Machine) -> [[f64; 2]; 2] {
         Machine::Gantry => [[96.0, 95.0], [98.0, 97.0]],
         Machine::Gimbal => [[95.0, 94.0], [99.0, 98.0]],
         Machine::Arm => [[77.0, 74.0], [85.0, 82.0]],
+        Machine::Drawn(_) => [[0.0; 2]; 2],
     }
 }
 
@@ -101,4 +102,54 @@ fn one_axis_is_trained_and_the_others_are_left_alone() {
     let desired = motion(Machine::Gantry, 20.0, 5);
     let [alone, with] = [None, Some((&model, Lanes::BOTH))].map(|model| flown(Machine::Gantry, &desired, model, 5).unwrap());
     assert!(with[1] < 0.3 * alone[1] && (with[0] - alone[0]).abs() < 0.05 * alone[0], "{alone:?} {with:?}");
+}
+
+/// What was predicted of a drawn machine, [mean, low, high], and what was flown, mean and each motion, %.
+fn predicted_and_flown(seed: u64) -> Option<([f64; 3], f64, Vec<f64>)> {
+    let machine = Machine::Drawn(seed);
+    let plant = machine.plant();
+    let time = 1.0 / plant.frequency;
+    let logs: Vec<Vec<AxisLog>> =
+        (0..4).map(|log| logged(machine, &motion(machine, 300.0 * time, 100 * seed + log), true, 200 * seed + log)).collect();
+    let settings =
+        Settings { age_s: plant.age_s, seed, name: machine.name().into(), known: None, axes: Vec::new(), draws: 4, force: true };
+    let trained = match train(&machine.description(), &logs, &settings) {
+        Ok(trained) => trained,
+        Err(error) => {
+            println!("{seed}: {error}");
+            return None;
+        }
+    };
+    let fit = &trained.axes[0];
+    let model = Model::from_bytes(&trained.model).unwrap();
+    if trained.divisor != 1 {
+        println!("{seed}: divisor {}", trained.divisor);
+        return None;
+    }
+    let flights: Vec<f64> = (0..6)
+        .map(|flight| {
+            let desired = motion(machine, 150.0 * time, 900_000 + 10 * seed + flight);
+            let alone = flown(machine, &desired, None, flight).unwrap()[0];
+            100.0 * (1.0 - flown(machine, &desired, Some((&model, Lanes::BOTH)), flight).unwrap()[0] / alone)
+        })
+        .collect();
+    let mean = flights.iter().sum::<f64>() / flights.len() as f64;
+    println!(
+        "{seed}: {:.1?} flown {mean:.1} {flights:.1?} lane {} age {:.3}",
+        fit.reduction_percent,
+        fit.lane.is_some(),
+        plant.age_s
+    );
+    Some((fit.reduction_percent, mean, flights))
+}
+
+#[test]
+#[ignore = "minutes: a hundred loops"]
+fn long_predicted_intervals_contain_what_is_flown() {
+    let found: Vec<_> = (1..61).filter_map(predicted_and_flown).collect();
+    let inside = |[_, low, high]: [f64; 3], value: f64| (low..=high).contains(&value);
+    let means = found.iter().filter(|(range, mean, _)| inside(*range, *mean)).count();
+    let flights: usize = found.iter().map(|(range, _, all)| all.iter().filter(|one| inside(*range, **one)).count()).sum();
+    let width = found.iter().map(|([_, low, high], ..)| high - low).sum::<f64>() / found.len() as f64;
+    println!("{means} of {} means, {flights} of {} flights, mean width {width:.1}", found.len(), 6 * found.len());
 }
