@@ -104,52 +104,61 @@ fn one_axis_is_trained_and_the_others_are_left_alone() {
     assert!(with[1] < 0.3 * alone[1] && (with[0] - alone[0]).abs() < 0.05 * alone[0], "{alone:?} {with:?}");
 }
 
-/// What was predicted of a drawn machine, [mean, low, high], and what was flown, mean and each motion, %.
-fn predicted_and_flown(seed: u64) -> Option<([f64; 3], f64, Vec<f64>)> {
-    let machine = Machine::Drawn(seed);
-    let plant = machine.plant();
-    let time = 1.0 / plant.frequency;
-    let logs: Vec<Vec<AxisLog>> =
-        (0..4).map(|log| logged(machine, &motion(machine, 300.0 * time, 100 * seed + log), true, 200 * seed + log)).collect();
-    let settings =
-        Settings { age_s: plant.age_s, seed, name: machine.name().into(), known: None, axes: Vec::new(), draws: 4, force: true };
-    let trained = match train(&machine.description(), &logs, &settings) {
-        Ok(trained) => trained,
-        Err(error) => {
-            println!("{seed}: {error}");
-            return None;
-        }
-    };
-    let fit = &trained.axes[0];
-    let model = Model::from_bytes(&trained.model).unwrap();
-    if trained.divisor != 1 {
-        println!("{seed}: divisor {}", trained.divisor);
-        return None;
-    }
-    let flights: Vec<f64> = (0..6)
-        .map(|flight| {
-            let desired = motion(machine, 150.0 * time, 900_000 + 10 * seed + flight);
-            let alone = flown(machine, &desired, None, flight).unwrap()[0];
-            100.0 * (1.0 - flown(machine, &desired, Some((&model, Lanes::BOTH)), flight).unwrap()[0] / alone)
+/// What was predicted of drawn machines, [mean, low, high], and the mean of what was flown, %; machines whose model runs at a
+/// divided rate, which only an application can fly, are left out.
+fn predicted_and_flown(seeds: std::ops::Range<u64>) -> Vec<(u64, [f64; 3], f64)> {
+    seeds
+        .filter_map(|seed| {
+            let machine = Machine::Drawn(seed);
+            let plant = machine.plant();
+            let time = 1.0 / plant.frequency;
+            let log = |log| logged(machine, &motion(machine, 300.0 * time, 100 * seed + log), true, 200 * seed + log);
+            let logs: Vec<Vec<AxisLog>> = (0..4).map(log).collect();
+            let settings = Settings {
+                age_s: plant.age_s,
+                seed,
+                name: machine.name().into(),
+                known: None,
+                axes: Vec::new(),
+                draws: 4,
+                force: true,
+            };
+            let trained = train(&machine.description(), &logs, &settings).unwrap();
+            if trained.divisor != 1 {
+                return None;
+            }
+            let model = Model::from_bytes(&trained.model).unwrap();
+            let flights = (0..6).map(|flight| {
+                let desired = motion(machine, 150.0 * time, 900_000 + 10 * seed + flight);
+                let alone = flown(machine, &desired, None, flight).unwrap()[0];
+                100.0 * (1.0 - flown(machine, &desired, Some((&model, Lanes::BOTH)), flight).unwrap()[0] / alone)
+            });
+            Some((seed, trained.axes[0].reduction_percent, flights.sum::<f64>() / 6.0))
         })
-        .collect();
-    let mean = flights.iter().sum::<f64>() / flights.len() as f64;
-    println!(
-        "{seed}: {:.1?} flown {mean:.1} {flights:.1?} lane {} age {:.3}",
-        fit.reduction_percent,
-        fit.lane.is_some(),
-        plant.age_s
-    );
-    Some((fit.reduction_percent, mean, flights))
+        .collect()
+}
+
+/// How many are within their limits, of how many, and the median width of these, points.
+fn covered(found: &[(u64, [f64; 3], f64)]) -> (usize, usize, f64) {
+    let outside: Vec<_> = found.iter().filter(|(_, [_, low, high], flown)| !(low..=high).contains(&flown)).collect();
+    let mut widths: Vec<f64> = found.iter().map(|(_, [_, low, high], _)| high - low).collect();
+    widths.sort_by(f64::total_cmp);
+    println!("outside: {outside:.1?}; median width {:.1}", widths[widths.len() / 2]);
+    (found.len() - outside.len(), found.len(), widths[widths.len() / 2])
 }
 
 #[test]
-#[ignore = "minutes: a hundred loops"]
-fn long_predicted_intervals_contain_what_is_flown() {
-    let found: Vec<_> = (1..61).filter_map(predicted_and_flown).collect();
-    let inside = |[_, low, high]: [f64; 3], value: f64| (low..=high).contains(&value);
-    let means = found.iter().filter(|(range, mean, _)| inside(*range, *mean)).count();
-    let flights: usize = found.iter().map(|(range, _, all)| all.iter().filter(|one| inside(*range, **one)).count()).sum();
-    let width = found.iter().map(|([_, low, high], ..)| high - low).sum::<f64>() / found.len() as f64;
-    println!("{means} of {} means, {flights} of {} flights, mean width {width:.1}", found.len(), 6 * found.len());
+fn predicted_limits_contain_what_is_flown() {
+    let (inside, of, width) = covered(&predicted_and_flown(1..11));
+    assert!(inside + 1 >= of && of >= 9 && width < 40.0, "{inside} of {of}, {width:.1}");
+}
+
+#[test]
+#[ignore = "minutes: a hundred loops, of which the second half decided nothing"]
+fn long_predicted_limits_contain_what_is_flown() {
+    for seeds in [61..101, 1..61] {
+        let (inside, of, width) = covered(&predicted_and_flown(seeds.clone()));
+        println!("{seeds:?}: {inside} of {of}");
+        assert!(inside as f64 >= 0.93 * of as f64 && width < 40.0, "{inside} of {of}, {width:.1}");
+    }
 }
