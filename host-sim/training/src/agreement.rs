@@ -59,8 +59,12 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// Its magnitude as a share of the most that is allowed, if that is a figure and no chance.
+    /// Its magnitude as a share of the most that is allowed, if that is a figure and no chance. A loop that falls with a little
+    /// more delay or thrust, where the logs' did not, has no number.
     fn beyond(self, most: f64) -> f64 {
+        if !self.value.is_finite() {
+            return f64::INFINITY;
+        }
         if self.value.abs() > SURE * self.error { self.value.abs() / most } else { 0.0 }
     }
 }
