@@ -59,8 +59,8 @@ pub struct AxisFit {
     pub with_network: f64,
     /// The same with both.
     pub with_both: f64,
-    /// Reduction by all lanes that there are, its guard on: of the logs on all models, and 95 % limits of the mean of five flights
-    /// of the logs' kind, %.
+    /// Reduction by all lanes that there are, guard on: of the logs on all models, and 95 % limits of the mean of five flights of
+    /// the logs' kind, %.
     pub reduction_percent: [f64; 3],
     /// Design of the feedback lane.
     pub lane: Option<String>,

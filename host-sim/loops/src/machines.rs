@@ -4,6 +4,8 @@
 //! hands over: what is known of a machine are its description and its logs; *source* drives with friction behind a position loop
 //! of PD; two masses on a spring as in Spong 1987; the arm's axes have gravity and pull at their neighbours.
 
+mod plant;
+
 use std::f64::consts::TAU;
 
 use impromptu_firmware::{
@@ -14,6 +16,8 @@ use impromptu_model_export::description::Signals;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
+
+use plant::Plant;
 
 use crate::{
     description::{AxisDescription, Fresh, FreshKind, LoopDescription},
@@ -33,38 +37,9 @@ pub enum Machine {
     Gimbal,
     /// Six axes with gravity, friction and pulls at their neighbours, 125 Hz.
     Arm,
-    /// One axis, drawn from a seed: 50 to 200 Hz, a position loop of 2 to 20 rad/s with a damping of 0.5 to 1.2, a spring in every
-    /// third, friction, gravity, dead time, disturbance and noise of any size.
+    /// One axis, drawn from a seed: 50 to 200 Hz, a position loop of 2 to 20 rad/s with a damping of 0.5 to 1.2, a spring in
+    /// every third, friction, gravity, dead time, disturbance and noise of any size.
     Drawn(u64),
-}
-
-/// What the axes of a machine are.
-struct Plant {
-    axes: &'static [&'static str],
-    unit: &'static str,
-    /// References a second.
-    rate_hz: f64,
-    /// Natural frequency, rad/s, and damping of the position loop.
-    frequency: f64,
-    damping: f64,
-    /// Frequency, Hz, of the spring between drive and load; none if 0.
-    spring_hz: f64,
-    /// Coulomb friction, unit/s².
-    friction: f64,
-    /// Gravity, unit/s², and pull of a neighbour's acceleration.
-    gravity: f64,
-    pull: f64,
-    /// How far it goes, and the fastest tone, Hz.
-    far: f64,
-    fastest_hz: f64,
-    /// Dead time of the drive and age of what is measured, s.
-    dead_s: f64,
-    age_s: f64,
-    /// Disturbance, as a share of what it takes to hold the farthest position.
-    disturbance: f64,
-    /// Noise of position and velocity.
-    noise: [f64; 2],
-    dither: f64,
 }
 
 /// Steps of the simulation in a tick.
@@ -93,67 +68,12 @@ impl Machine {
     }
 
     fn plant(self) -> Plant {
-        let servo = Plant {
-            axes: &["angle"],
-            unit: "rad",
-            rate_hz: 100.0,
-            frequency: 7.7,
-            damping: 0.7,
-            spring_hz: 0.0,
-            friction: 1.0,
-            gravity: 0.0,
-            pull: 0.0,
-            far: 1.5,
-            fastest_hz: 1.2,
-            dead_s: 0.02,
-            age_s: 0.005,
-            disturbance: 2e-3,
-            noise: [1e-3, 1e-2],
-            dither: 0.02,
-        };
         match self {
-            Self::Servo => servo,
-            Self::Gantry => Plant {
-                axes: &["x", "y"],
-                unit: "m",
-                frequency: 9.0,
-                damping: 0.8,
-                spring_hz: 4.0,
-                friction: 0.1,
-                far: 0.4,
-                fastest_hz: 0.9,
-                noise: [1e-4, 1e-3],
-                dither: 0.004,
-                ..servo
-            },
-            Self::Gimbal => Plant {
-                axes: &["yaw", "pitch", "roll"],
-                rate_hz: 200.0,
-                frequency: 18.0,
-                friction: 0.5,
-                gravity: 1.0,
-                far: 0.8,
-                fastest_hz: 2.0,
-                dead_s: 0.005,
-                noise: [5e-4, 1e-2],
-                dither: 0.01,
-                ..servo
-            },
-            Self::Arm => Plant {
-                axes: &["j1", "j2", "j3", "j4", "j5", "j6"],
-                rate_hz: 125.0,
-                frequency: 10.0,
-                damping: 0.9,
-                friction: 1.0,
-                gravity: 4.0,
-                pull: 0.05,
-                far: 1.0,
-                fastest_hz: 0.8,
-                noise: [2e-4, 5e-3],
-                dither: 0.01,
-                ..servo
-            },
-            Self::Drawn(seed) => drawn(servo, seed),
+            Self::Servo => Plant::servo(),
+            Self::Gantry => Plant::gantry(),
+            Self::Gimbal => Plant::gimbal(),
+            Self::Arm => Plant::arm(),
+            Self::Drawn(seed) => Plant::drawn(seed),
         }
     }
 
@@ -171,33 +91,6 @@ impl Machine {
         });
         let axes = axes.collect();
         LoopDescription { name: self.name().into(), time: "time_s".into(), rate_hz: Some(plant.rate_hz), age_ms: None, axes }
-    }
-}
-
-/// A machine of one axis from a seed.
-fn drawn(usual: Plant, seed: u64) -> Plant {
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let mut between = |low: f64, high: f64| low * (high / low).powf(random.random_range(0.0..1.0));
-    let rate_hz = between(50.0, 200.0);
-    let frequency = between(2.0, 20.0f64.min(rate_hz / 7.0));
-    let (far, noise) = (between(0.3, 3.0), between(1e-4, 1e-3));
-    let stiffness = far * frequency * frequency;
-    let spring = seed.is_multiple_of(3);
-    Plant {
-        rate_hz,
-        frequency,
-        damping: between(if spring { 0.7 } else { 0.5 }, 1.2),
-        spring_hz: if spring { between(2.0, 4.0) * frequency / TAU } else { 0.0 },
-        friction: between(2e-3, 4e-2) * stiffness,
-        gravity: between(1e-3, 0.1) * stiffness,
-        far,
-        fastest_hz: between(0.4, 1.2) * frequency / TAU,
-        dead_s: between(0.01, 0.2) / frequency,
-        age_s: between(0.01, 0.2) / frequency,
-        disturbance: between(1e-3, 2e-2),
-        noise: [noise * far, noise * far * frequency],
-        dither: 0.012 * far,
-        ..usual
     }
 }
 

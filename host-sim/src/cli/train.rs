@@ -2,6 +2,8 @@
 
 mod any_loop;
 mod columns;
+mod movement;
+mod vehicle;
 
 use std::path::{Path, PathBuf};
 
@@ -13,10 +15,7 @@ use impromptu_flight::flight::Rates;
 use impromptu_loops::complete::AxisFit;
 use impromptu_sim::{controller::Controller, flight_log::FlightLog, flights::Loop};
 use impromptu_training::{
-    AxisGates, LearnError, LearnSettings, Learned, Pipeline, Purpose, Recipe, Trained, Validation,
-    agreement::{Disagreement, agreement},
-    breakdown::sound,
-    check_gates,
+    AxisGates, LearnError, LearnSettings, Learned, Pipeline, Purpose, Recipe, Trained, Validation, check_gates,
     coverage::{Coverage, coverage},
     derived, dithered_logs,
     files::model_files,
@@ -29,6 +28,10 @@ use impromptu_training::{
     write_model_files,
 };
 use serde::Serialize;
+
+use movement::check_movement;
+pub(super) use vehicle::OtherLoop;
+use vehicle::compared;
 
 use super::{
     Invocation,
@@ -150,17 +153,6 @@ fn read(paths: &[PathBuf], rate_hz: f64) -> Result<Vec<FlightLog>> {
     Ok(paths.iter().map(|path| FlightLog::read(path, rate_hz)).collect::<Result<_, _>>()?)
 }
 
-/// The simulated loop is not that of the logs.
-#[derive(Debug, thiserror::Error)]
-#[error(
-    "--vehicle {vehicle}: {found}; leave --vehicle out, and both lanes are chosen on what the logs alone leave possible, or give \
-     the vehicle, --gains, --controller and --condition that were flown (--force trains all the same)"
-)]
-pub(super) struct OtherLoop {
-    vehicle: String,
-    found: Disagreement,
-}
-
 /// The logs' loop: what of it is known.
 struct Origin {
     /// The simulated loop of the validation flights.
@@ -228,7 +220,7 @@ impl Train {
         }
         let mut gates = self.pass_gates(invocation, &logs, origin.delay_s, seed)?;
         if let Some(closed_loop) = &origin.closed_loop {
-            let differs = self.compared(invocation, closed_loop, &[&logs, &dithered])?;
+            let differs = compared(self, invocation, closed_loop, &[&logs, &dithered])?;
             gates.overridden =
                 Vec::from_iter(gates.overridden.into_iter().chain(differs)).into_iter().reduce(|a, b| a + "; " + &b);
         }
@@ -270,7 +262,7 @@ impl Train {
             [] => dithered_logs(&recipe.lane, closed_loop, derived(seed, Purpose::Identification))?,
             paths => {
                 let logs = read(paths, closed_loop.rate_hz())?;
-                differs = self.compared(invocation, closed_loop, &[&logs])?;
+                differs = compared(self, invocation, closed_loop, &[&logs])?;
                 logs
             }
         };
@@ -280,28 +272,6 @@ impl Train {
         let seconds = Kept::read(&kept).map_or(0.0, learned_s);
         let minutes = f64::from(seconds) / 60.0;
         Ok(Made { learned, trained, gates: Vec::new(), overridden: differs, fits: Vec::new(), minutes })
-    }
-
-    /// Refuses a simulated loop that is not that of the logs, or says what --force overrides.
-    fn compared(&self, invocation: &Invocation, closed_loop: &Loop, logs: &[&[FlightLog]]) -> Result<Option<String>> {
-        invocation.console.stage("flying the logs' references with --vehicle");
-        for logs in logs {
-            let (sound, _) = sound(logs);
-            let found = if sound.is_empty() { None } else { agreement(closed_loop, &sound)?.disagreement(closed_loop) };
-            match found {
-                Some(found) if self.force => {
-                    let overridden = format!("--vehicle overridden by --force: {found}");
-                    invocation.console.note(&format!("warning: {overridden}"));
-                    return Ok(Some(overridden));
-                }
-                Some(found) => {
-                    let vehicle = self.vehicle.as_deref().unwrap_or_default();
-                    return Err(anyhow::Error::new(OtherLoop { vehicle: vehicle.into(), found }));
-                }
-                None => {}
-            }
-        }
-        Ok(None)
     }
 
     /// Why the arguments do not go together, if they do not.
@@ -397,23 +367,6 @@ impl Origin {
             validation: validation.transpose()?,
         })
     }
-}
-
-/// Logs in which nothing moves teach nothing: the largest extent of the measured path, m, must be above this.
-const LEAST_EXTENT: f64 = 0.2;
-
-fn check_movement(logs: &[FlightLog]) -> Result<()> {
-    let extent = (0..3).map(|axis| {
-        let values = || logs.iter().flat_map(|log| log.rows.iter().map(move |row| row.measured_position[axis]));
-        values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
-    });
-    let extent = extent.fold(0.0, f64::max);
-    if extent < LEAST_EXTENT {
-        bail!(
-            "--log: no excitation: the vehicle moves by {extent:.3} m only; log flights along strokes, splines or several tones"
-        );
-    }
-    Ok(())
 }
 
 /// Passes epochs on; all trainings are one count.

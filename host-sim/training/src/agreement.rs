@@ -7,7 +7,7 @@
 //! logs that nothing was fitted to; the rest is wind and noise.
 //!
 //! Wind, noise, a payload and a battery that is half empty are no other loop: a constant and some of the thrust are free. Noise
-//! is flown all the same: motors that it drives to their bounds answer otherwise. What delay and thrust change is flown without it.
+//! is flown all the same: motors that it drives to their bounds answer otherwise; what delay and thrust change is flown without.
 
 use impromptu_diagnosis::prediction::root_mean_square;
 use impromptu_sim::{
