@@ -132,7 +132,7 @@ fn long_loops_are_told_from_each_other_in_every_condition() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(16))]
+    #![proptest_config(ProptestConfig::with_cases(8))]
 
     /// One drawn case of all, with any thrust that a battery leaves.
     #[test]
