@@ -259,7 +259,7 @@ other_simulators() {
     cargo check --manifest-path tests/peers/Cargo.toml --package impromptu-plant-benchmark --benches --locked
 }
 
-# A quarter of the time for each. Without a sanitizer the toolchain need not be a nightly one. In safe Rust a read out of bounds
+# A fifth of the time for each. Without a sanitizer the toolchain need not be a nightly one. In safe Rust a read out of bounds
 # is a panic, an overflow too (cargo-fuzz turns the checks on).
 # fuzz TARGET LENGTH SEEDS...
 fuzz() {
@@ -267,7 +267,7 @@ fuzz() {
     shift 2
     mkdir -p "tests/fuzz/corpus/$fuzzed"
     cargo fuzz run --fuzz-dir tests/fuzz --sanitizer none "$fuzzed" "tests/fuzz/corpus/$fuzzed" "$@" -- \
-        -max_total_time=$(((IMPROMPTU_FUZZ_SECONDS + 3) / 4)) -max_len="$length" -print_final_stats=1
+        -max_total_time=$(((IMPROMPTU_FUZZ_SECONDS + 4) / 5)) -max_len="$length" -print_final_stats=1
 }
 # fuzzing SECONDS
 fuzzing() {
@@ -278,6 +278,7 @@ fuzzing() {
     fuzz link 1024
     fuzz calls 2048
     fuzz settings 2048
+    fuzz description 4096
 }
 
 case $tier in

@@ -120,6 +120,17 @@ impl Judge<'_> {
     /// # Errors
     /// If the model is refused.
     fn errors(&self, bench: &[Piece<'_>], case: Case, model: Option<(&[u8], Lanes)>) -> Result<Vec<Vec<f64>>, ExportError> {
+        self.errors_guarded(bench, case, model, false)
+    }
+
+    /// The same with the add-on's guard on or off.
+    fn errors_guarded(
+        &self,
+        bench: &[Piece<'_>],
+        case: Case,
+        model: Option<(&[u8], Lanes)>,
+        guarded: bool,
+    ) -> Result<Vec<Vec<f64>>, ExportError> {
         let Some((bytes, lanes)) = model else {
             return Ok(bench.iter().map(|piece| piece.errors(case, self.age_ticks, self.settled, None)).collect());
         };
@@ -127,7 +138,7 @@ impl Judge<'_> {
         bench
             .iter()
             .map(|piece| {
-                let mut flight = Flight::new(&model, self.layout, self.rate_hz, lanes, false).map_err(ExportError::Refused)?;
+                let mut flight = Flight::new(&model, self.layout, self.rate_hz, lanes, guarded).map_err(ExportError::Refused)?;
                 Ok(piece.errors(case, self.age_ticks, self.settled, Some(&mut flight)))
             })
             .collect()
@@ -203,16 +214,21 @@ impl Judge<'_> {
         Ok(scores)
     }
 
-    /// RMS errors without and with a model, of each axis on each set of models and each piece.
+    /// RMS errors without and with a model, whose guard is on or off, of each axis on each set of models and each piece.
     ///
     /// # Errors
     /// If the model is refused.
-    pub fn predicted(&self, benches: &[Vec<Piece<'_>>], model: &[u8], lanes: Lanes) -> Result<Vec<Vec<[f64; 2]>>, ExportError> {
+    pub fn predicted(
+        &self,
+        benches: &[Vec<Piece<'_>>],
+        (model, lanes): (&[u8], Lanes),
+        guarded: bool,
+    ) -> Result<Vec<Vec<[f64; 2]>>, ExportError> {
         let flown: Vec<Vec<Vec<[f64; 2]>>> = benches
             .par_iter()
             .map(|bench| {
                 let baseline = self.errors(bench, Case::NOMINAL, None)?;
-                let errors = self.errors(bench, Case::NOMINAL, Some((model, lanes)))?;
+                let errors = self.errors_guarded(bench, Case::NOMINAL, Some((model, lanes)), guarded)?;
                 let pairs = baseline.iter().zip(&errors).map(|(a, b)| a.iter().zip(b).map(|(a, b)| [*a, *b]).collect());
                 Ok::<_, ExportError>(pairs.collect())
             })

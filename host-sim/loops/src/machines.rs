@@ -4,6 +4,8 @@
 //! hands over: what is known of a machine are its description and its logs; *source* drives with friction behind a position loop
 //! of PD; two masses on a spring as in Spong 1987; the arm's axes have gravity and pull at their neighbours.
 
+mod plant;
+
 use std::f64::consts::TAU;
 
 use impromptu_firmware::{
@@ -14,6 +16,8 @@ use impromptu_model_export::description::Signals;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
+
+use plant::Plant;
 
 use crate::{
     description::{AxisDescription, Fresh, FreshKind, LoopDescription},
@@ -33,33 +37,9 @@ pub enum Machine {
     Gimbal,
     /// Six axes with gravity, friction and pulls at their neighbours, 125 Hz.
     Arm,
-}
-
-/// What the axes of a machine are.
-struct Plant {
-    axes: &'static [&'static str],
-    unit: &'static str,
-    /// References a second.
-    rate_hz: f64,
-    /// Natural frequency, rad/s, and damping of the position loop.
-    frequency: f64,
-    damping: f64,
-    /// Frequency, Hz, of the spring between drive and load; none if 0.
-    spring_hz: f64,
-    /// Coulomb friction, unit/s².
-    friction: f64,
-    /// Gravity, unit/s², and pull of a neighbour's acceleration.
-    gravity: f64,
-    pull: f64,
-    /// How far it goes, and the fastest tone, Hz.
-    far: f64,
-    fastest_hz: f64,
-    /// Dead time of the drive and age of what is measured, s.
-    dead_s: f64,
-    age_s: f64,
-    /// Noise of position and velocity.
-    noise: [f64; 2],
-    dither: f64,
+    /// One axis, drawn from a seed: 50 to 200 Hz, a position loop of 2 to 20 rad/s with a damping of 0.5 to 1.2, a spring in
+    /// every third, friction, gravity, dead time, disturbance and noise of any size.
+    Drawn(u64),
 }
 
 /// Steps of the simulation in a tick.
@@ -78,6 +58,7 @@ impl Machine {
             Self::Gantry => "gantry",
             Self::Gimbal => "gimbal",
             Self::Arm => "arm",
+            Self::Drawn(_) => "drawn",
         }
     }
 
@@ -87,65 +68,12 @@ impl Machine {
     }
 
     fn plant(self) -> Plant {
-        let servo = Plant {
-            axes: &["angle"],
-            unit: "rad",
-            rate_hz: 100.0,
-            frequency: 7.7,
-            damping: 0.7,
-            spring_hz: 0.0,
-            friction: 1.0,
-            gravity: 0.0,
-            pull: 0.0,
-            far: 1.5,
-            fastest_hz: 1.2,
-            dead_s: 0.02,
-            age_s: 0.005,
-            noise: [1e-3, 1e-2],
-            dither: 0.02,
-        };
         match self {
-            Self::Servo => servo,
-            Self::Gantry => Plant {
-                axes: &["x", "y"],
-                unit: "m",
-                frequency: 9.0,
-                damping: 0.8,
-                spring_hz: 4.0,
-                friction: 0.1,
-                far: 0.4,
-                fastest_hz: 0.9,
-                noise: [1e-4, 1e-3],
-                dither: 0.004,
-                ..servo
-            },
-            Self::Gimbal => Plant {
-                axes: &["yaw", "pitch", "roll"],
-                rate_hz: 200.0,
-                frequency: 18.0,
-                friction: 0.5,
-                gravity: 1.0,
-                far: 0.8,
-                fastest_hz: 2.0,
-                dead_s: 0.005,
-                noise: [5e-4, 1e-2],
-                dither: 0.01,
-                ..servo
-            },
-            Self::Arm => Plant {
-                axes: &["j1", "j2", "j3", "j4", "j5", "j6"],
-                rate_hz: 125.0,
-                frequency: 10.0,
-                damping: 0.9,
-                friction: 1.0,
-                gravity: 4.0,
-                pull: 0.05,
-                far: 1.0,
-                fastest_hz: 0.8,
-                noise: [2e-4, 5e-3],
-                dither: 0.01,
-                ..servo
-            },
+            Self::Servo => Plant::servo(),
+            Self::Gantry => Plant::gantry(),
+            Self::Gimbal => Plant::gimbal(),
+            Self::Arm => Plant::arm(),
+            Self::Drawn(seed) => Plant::drawn(seed),
         }
     }
 
@@ -215,7 +143,7 @@ impl Running {
     fn run(&mut self, references: &[f64]) {
         let h = 1.0 / (self.plant.rate_hz * STEPS as f64);
         let Plant { frequency, damping, spring_hz, friction, gravity, pull, far, .. } = self.plant;
-        let disturbance = 0.02 * far * frequency * frequency * 0.1;
+        let disturbance = self.plant.disturbance * far * frequency * frequency;
         for _ in 0..STEPS {
             let before = self.accelerations.clone();
             for (axis, reference) in references.iter().enumerate() {
@@ -300,7 +228,7 @@ pub fn logged(machine: Machine, desired: &[Vec<f64>], dithered: bool, seed: u64)
             log.reference.push(references[axis]);
             log.measured.push(measured[axis][0]);
             log.velocity.push(measured[axis][1]);
-            let noise = 0.02 * running.plant.far * running.plant.frequency.powi(2) * 0.1 * running.normal();
+            let noise = running.plant.disturbance * running.plant.far * running.plant.frequency.powi(2) * running.normal();
             let acceleration = running.accelerations[axis] + noise;
             log.fresh.get_or_insert_default().push(acceleration);
         }

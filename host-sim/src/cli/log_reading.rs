@@ -7,7 +7,7 @@ use impromptu_diagnosis::plausibility::{Reading, TimeUnit};
 use impromptu_loops::{age::UnknownAge, draft::DraftError};
 use impromptu_training::{channel::ChannelError, track::TrackError};
 
-use super::Invocation;
+use super::{Invocation, train::OtherLoop};
 
 /// How logs are read.
 #[derive(Clone, Copy, Debug, Args)]
@@ -62,7 +62,7 @@ pub(super) fn say<'a>(invocation: &Invocation, file: &str, notes: impl Iterator<
 
 /// Whether the arguments leave open how a log is meant.
 pub(super) fn leaves_open(error: &anyhow::Error) -> bool {
-    if error.downcast_ref::<DraftError>().is_some() || error.downcast_ref::<UnknownAge>().is_some() {
+    if error.is::<DraftError>() || error.is::<UnknownAge>() || error.is::<OtherLoop>() {
         return true;
     }
     let open = |error: &ChannelError| matches!(error, ChannelError::Implausible { source, .. } if source.leaves_open());

@@ -2,6 +2,8 @@
 
 pub(super) mod any_loop;
 mod columns;
+mod movement;
+mod vehicle;
 
 use std::path::{Path, PathBuf};
 
@@ -26,6 +28,10 @@ use impromptu_training::{
     write_model_files,
 };
 use serde::Serialize;
+
+use movement::check_movement;
+pub(super) use vehicle::OtherLoop;
+use vehicle::compared;
 
 use super::{
     Invocation,
@@ -68,7 +74,8 @@ pub(super) struct Train {
     /// Zero-phase smoothing of the logs, ms; 0 for logs without noise [default: the recipe's, 60].
     #[arg(long, value_name = "N", value_parser = milliseconds)]
     smoothing_ms: Option<f64>,
-    /// Vehicle (name or TOML file) for the validation flights on which the feedback lane is chosen; none without it.
+    /// Vehicle (name or TOML file) for the validation flights on which the feedback lane is chosen, in the place of models from
+    /// the logs; refused if it answers the logs' references otherwise than the logs show.
     #[arg(long, value_name = "NAME|FILE.toml")]
     vehicle: Option<String>,
     /// Gains of its position loop.
@@ -211,7 +218,12 @@ impl Train {
         if self.vehicle.is_none() && self.delay_ms.is_none() {
             origin.delay_s = any_loop::age_of_flights(&logs, invocation);
         }
-        let gates = self.pass_gates(invocation, &logs, origin.delay_s, seed)?;
+        let mut gates = self.pass_gates(invocation, &logs, origin.delay_s, seed)?;
+        if let Some(closed_loop) = &origin.closed_loop {
+            let differs = compared(self, invocation, closed_loop, &[&logs, &dithered])?;
+            gates.overridden =
+                Vec::from_iter(gates.overridden.into_iter().chain(differs)).into_iter().reduce(|a, b| a + "; " + &b);
+        }
         invocation.console.stage(&format!("training on {} logs", logs.len()));
         let pipeline = origin.pipeline(recipe, seed, self.force)?;
         let learned = pipeline.learn(&logs, &mut watched(invocation, recipe)).map_err(|error| match error {
@@ -245,16 +257,21 @@ impl Train {
         let (recipe, learned) = learned_in_flight(recipe, &kept, closed_loop.rate_hz(), &motions)
             .with_context(|| format!("--learned {}", path.display()))?;
         invocation.console.stage("designing the feedback lane");
+        let mut differs = None;
         let dithered = match self.dithered.as_slice() {
             [] => dithered_logs(&recipe.lane, closed_loop, derived(seed, Purpose::Identification))?,
-            paths => read(paths, closed_loop.rate_hz())?,
+            paths => {
+                let logs = read(paths, closed_loop.rate_hz())?;
+                differs = compared(self, invocation, closed_loop, &[&logs])?;
+                logs
+            }
         };
         let remark = "network: the preview part of what was learned in flight";
         let trained = origin.pipeline(&recipe, seed, false)?.complete(&learned, &dithered, &self.name, Some(remark))?;
         let learned_s = |kept: Kept<'_>| kept.axes().fold(0.0f32, |most, axis| most.max(axis.learned_s));
         let seconds = Kept::read(&kept).map_or(0.0, learned_s);
         let minutes = f64::from(seconds) / 60.0;
-        Ok(Made { learned, trained, gates: Vec::new(), overridden: None, fits: Vec::new(), minutes })
+        Ok(Made { learned, trained, gates: Vec::new(), overridden: differs, fits: Vec::new(), minutes })
     }
 
     /// Why the arguments do not go together, if they do not.
@@ -350,23 +367,6 @@ impl Origin {
             validation: validation.transpose()?,
         })
     }
-}
-
-/// Logs in which nothing moves teach nothing: the largest extent of the measured path, m, must be above this.
-const LEAST_EXTENT: f64 = 0.2;
-
-fn check_movement(logs: &[FlightLog]) -> Result<()> {
-    let extent = (0..3).map(|axis| {
-        let values = || logs.iter().flat_map(|log| log.rows.iter().map(move |row| row.measured_position[axis]));
-        values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
-    });
-    let extent = extent.fold(0.0, f64::max);
-    if extent < LEAST_EXTENT {
-        bail!(
-            "--log: no excitation: the vehicle moves by {extent:.3} m only; log flights along strokes, splines or several tones"
-        );
-    }
-    Ok(())
 }
 
 /// Passes epochs on; all trainings are one count.

@@ -24,6 +24,7 @@
 //! | 1 | `channel`, `breakdown`, `hold_out` | channels of logs; flights that teach nothing; logs that are held out |
 //! | 1 | `turned` | flights turned about the vertical |
 //! | 1 | `purpose`, `observer` | seeds; who watches |
+//! | 1 | `agreement` | logs beside a simulated loop |
 //! | 1 | `coverage` | trajectories beside what was trained on |
 //! | 2 | `examples`, `gates` | rows of features from logs; the diagnosis before a training |
 //! | 2 | `track` | axes of the logs of any loop, for a replay |
@@ -38,6 +39,7 @@
 //! | 8 | `pipeline` | from logs to a model file |
 //! | 9 | `build` | from a loop to its models |
 
+pub mod agreement;
 pub mod breakdown;
 pub mod build;
 pub mod bypass;

@@ -1,0 +1,50 @@
+//! Whether the vehicle of `train --vehicle` is that of the logs.
+
+use anyhow::Result;
+use impromptu_sim::{flight_log::FlightLog, flights::Loop};
+use impromptu_training::{
+    agreement::{Disagreement, agreement},
+    breakdown::sound,
+    observer::Observer as _,
+};
+
+use super::Train;
+use crate::cli::Invocation;
+
+/// The simulated loop is not that of the logs.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "--vehicle {vehicle}: {found}; leave --vehicle out, and both lanes are chosen on what the logs alone leave possible, or give \
+     the vehicle, --gains, --controller and --condition that were flown (--force trains all the same)"
+)]
+pub(in crate::cli) struct OtherLoop {
+    vehicle: String,
+    found: Disagreement,
+}
+
+/// Refuses a simulated loop that is not that of the logs, or says what --force overrides.
+pub(super) fn compared(
+    arguments: &Train,
+    invocation: &Invocation,
+    closed_loop: &Loop,
+    logs: &[&[FlightLog]],
+) -> Result<Option<String>> {
+    invocation.console.stage("flying the logs' references with --vehicle");
+    for logs in logs {
+        let (sound, _) = sound(logs);
+        let found = if sound.is_empty() { None } else { agreement(closed_loop, &sound)?.disagreement(closed_loop) };
+        match found {
+            Some(found) if arguments.force => {
+                let overridden = format!("--vehicle overridden by --force: {found}");
+                invocation.console.note(&format!("warning: {overridden}"));
+                return Ok(Some(overridden));
+            }
+            Some(found) => {
+                let vehicle = arguments.vehicle.as_deref().unwrap_or_default();
+                return Err(anyhow::Error::new(OtherLoop { vehicle: vehicle.into(), found }));
+            }
+            None => {}
+        }
+    }
+    Ok(None)
+}
