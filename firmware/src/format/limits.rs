@@ -1,7 +1,7 @@
 //! How much a model can have.
 //!
-//! *in* nothing; *out* the largest counts of any model, and those of a type that says none; *never* one that is passed in silence;
-//! *source* a Cortex-M4F's memory, and eight axes of a machine.
+//! *in* nothing; *out* the largest counts of any model, and those of a type that says none; *never* one that is passed in
+//! silence; *source* a Cortex-M4F's memory, and eight axes of a machine.
 
 /// Oldest version of the format that this build reads.
 pub(super) const OLDEST: u16 = 2;

@@ -172,7 +172,8 @@ proptest! {
 fn lanes_of_eight_axes_do_not_know_of_each_other() {
     let only = |description: &Description| encode(description, None, Precision::Float, &[]).unwrap();
     let without_network = |mut description: Description| {
-        (description.features.clear(), description.envelope.clear());
+        description.features.clear();
+        description.envelope.clear();
         description
     };
     let together = without_network(axes(8));

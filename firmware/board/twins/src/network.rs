@@ -23,7 +23,7 @@ pub(crate) fn run<const WORDS: usize>(
     mark: &impl Fn(),
 ) -> Result<(), Failure> {
     let file = read_file(cases, &mut memory.bulk, length)?;
-    let mut place = Model::EMPTY;
+    let mut place: Model<'_> = Model::EMPTY;
     let model = Model::load_into(&mut place, file, &mut memory.scratch).map_err(|_| Failure("a model file is refused"))?;
     let network = model.network().ok_or(Failure("a model file has no network"))?;
     let (mut row, mut result) = ([0.0; MAX_FEATURES], [0.0; DEFAULT_OUTPUTS]);

@@ -124,7 +124,7 @@ fn predicted_and_flown(seeds: std::ops::Range<u64>) -> Vec<(u64, [f64; 3], f64)>
             if trained.divisor != 1 {
                 return None;
             }
-            let model = Model::from_bytes(&trained.model).unwrap();
+            let model = LargestModel::sized(&trained.model).unwrap();
             let flights = (0..6).map(|flight| {
                 let desired = motion(machine, 150.0 * time, 900_000 + 10 * seed + flight);
                 let alone = flown(machine, &desired, None, flight).unwrap()[0];
