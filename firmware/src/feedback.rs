@@ -123,6 +123,7 @@ impl AxisState {
     /// `authority` (0..=1) scales the fast clamp and what is integrated; `dt` is the reference's period, s. While not `active`
     /// the lags are filled and the integral stands still: a lane that is faded out must not lose its slow part at once;
     /// [`AxisState::clear_integral`] empties it afterwards.
+    #[inline]
     pub fn step<const A: usize>(
         &mut self,
         lane: &Lane<'_, A>,
@@ -132,7 +133,19 @@ impl AxisState {
         dt: f32,
         active: bool,
     ) -> f32 {
-        let lags = lane.lags;
+        self.step_lagged(lane.lags, axis, errors, authority, dt, active)
+    }
+
+    /// The same code for lanes of any number of axes.
+    fn step_lagged(
+        &mut self,
+        lags: usize,
+        axis: &Axis<'_>,
+        errors: [f32; MAX_ERRORS],
+        authority: f32,
+        dt: f32,
+        active: bool,
+    ) -> f32 {
         for (lagged, error) in self.errors.iter_mut().zip(errors) {
             push(lagged, lags, finite_or_zero(error));
         }

@@ -738,8 +738,10 @@ static int flight_push(unsigned pair, void *place)
     memcpy(&setpoint, desired, sizeof setpoint);
     given = at(&setpoint);
     may = usual(desired, DESIRED) ? MAY(OK) : finite(desired, DESIRED) ? MAY(OK) | MAY(NOT_FINITE) : MAY(NOT_FINITE);
-    JUDGE(impromptu_flight_push(place, given), IF_MADE(flight_known[pair].made, may), flights[pair].object);
-    EXPECT(impromptu_flight_push(&plain_flights[pair].object, &setpoint) == IMPROMPTU_STATUS_OK);
+    may |= may & MAY(OK) ? MAY(FULL) : 0;
+    const impromptu_status status = impromptu_flight_push(place, given);
+    JUDGE(status, IF_MADE(flight_known[pair].made, may), flights[pair].object);
+    EXPECT(impromptu_flight_push(&plain_flights[pair].object, &setpoint) == status);
     return fenced(0);
 }
 
@@ -751,8 +753,11 @@ static int flight_follow(unsigned pair)
     for (unsigned sample = choice(60); sample > 0 && flight_known[pair].made; sample--) {
         row(flight_known[pair].tick / 5 + sample, desired);
         memcpy(&setpoint, desired, sizeof setpoint);
-        EXPECT(impromptu_flight_push(&flights[pair].object, &setpoint) == IMPROMPTU_STATUS_OK);
-        EXPECT(impromptu_flight_push(&plain_flights[pair].object, &setpoint) == IMPROMPTU_STATUS_OK);
+        const impromptu_status status = impromptu_flight_push(&flights[pair].object, &setpoint);
+        EXPECT(impromptu_flight_push(&plain_flights[pair].object, &setpoint) == status);
+        if (status == IMPROMPTU_STATUS_FULL)
+            break;
+        EXPECT(status == IMPROMPTU_STATUS_OK);
     }
     return 1;
 }

@@ -196,7 +196,7 @@ impl<'a> Network<'a> {
                 self.skip(back, outputs);
                 let sums = integer::sums(layers, front, back);
                 if self.output_scale.len() > ROWS {
-                    self.denormalise_blocks(sums, integer::blocks_of_scales(layers), outputs);
+                    self.denormalise_blocks(sums, layers, outputs);
                 } else {
                     self.denormalise(scaled(sums, integer::scales(layers)), outputs);
                 }
@@ -234,10 +234,11 @@ impl<'a> Network<'a> {
         }
     }
 
-    /// [`Network::denormalise`] of integer layers with more outputs than a block has rows.
+    /// [`Network::denormalise`] of integer layers with more outputs than a block has rows. Apart from what a small network needs
+    /// of the stack.
     #[inline(never)]
-    fn denormalise_blocks<'s>(&self, sums: &[u32], scales: impl Iterator<Item = &'s [[u8; 4]; ROWS]>, outputs: &mut [f32]) {
-        let values = sums.chunks(ROWS).zip(scales).flat_map(|(sums, scales)| scaled(sums, scales));
+    fn denormalise_blocks(&self, sums: &[u32], layers: &[integer::Layer<'_>], outputs: &mut [f32]) {
+        let values = sums.chunks(ROWS).zip(integer::blocks_of_scales(layers)).flat_map(|(sums, scales)| scaled(sums, scales));
         self.denormalise(values, outputs);
     }
 

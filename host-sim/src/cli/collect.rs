@@ -33,6 +33,7 @@ is flown ([recipe] of --config). With --dither, random steps on the position ref
 the feedback lane is identified from. All flights are rehearsed smaller first, and flown as large as the loop was seen to follow.
 
 Examples:
+  host-sim collect --condition lab --flights 4 --out logs
   host-sim collect --condition lab --out logs
   host-sim collect --condition lab --dither 0.01 --out dithered
   host-sim collect --next --log logs/*.csv --out next

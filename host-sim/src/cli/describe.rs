@@ -23,6 +23,7 @@ reference_velocity, desired_velocity; fresh = { column, kind = \"acceleration\" 
 than the measured position, wrap for an angle that wraps, cap and cap_rate for the largest correction and its fastest change.
 
 Examples:
+  host-sim describe --log host-sim/reproduction/data/nanobench/B3_figure8_slow_rep1.csv --columns t,sp_ctrltarget_x,px
   host-sim describe --log motor.csv
   host-sim describe --log motor.csv --columns t,setpoint,angle --name motor --output motor.toml
   host-sim train --loop motor.toml --log motor-*.csv --delay-ms 5 --out models")]

@@ -50,9 +50,9 @@ flown along signals
 of the log's kind: measured errors, so with the noise in them.
 
 Examples:
+  host-sim diagnose --vehicle crazyflie --gains stock --condition lab --axis x z
   host-sim diagnose --log monday.csv tuesday.csv --delay-ms 24
-  host-sim diagnose --log motor.csv --columns t,setpoint,angle --sub-rate 50
-  host-sim diagnose --vehicle crazyflie --gains stock --condition lab --axis x z")]
+  host-sim diagnose --log motor.csv --columns t,setpoint,angle --sub-rate 50")]
 pub(super) struct Diagnose {
     /// Logs of one loop.
     #[arg(long, value_name = "FILE.csv", num_args = 1.., required_unless_present = "vehicle", conflicts_with = "vehicle")]

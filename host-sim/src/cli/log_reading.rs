@@ -5,9 +5,9 @@
 use clap::{Args, ValueEnum};
 use impromptu_diagnosis::plausibility::{Reading, TimeUnit};
 use impromptu_loops::{age::UnknownAge, draft::DraftError};
-use impromptu_training::{channel::ChannelError, track::TrackError};
+use impromptu_training::{agreement::Disagreement, channel::ChannelError, track::TrackError};
 
-use super::{Invocation, train::OtherLoop};
+use super::Invocation;
 
 /// How logs are read.
 #[derive(Clone, Copy, Debug, Args)]
@@ -58,6 +58,17 @@ pub(super) fn say<'a>(invocation: &Invocation, file: &str, notes: impl Iterator<
             said.push(note);
         }
     }
+}
+
+/// The simulated loop is not that of the logs.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "--vehicle {vehicle}: {found}; leave --vehicle out, and both lanes are chosen on what the logs alone leave possible, or give \
+     the vehicle, --gains, --controller and --condition that were flown (--force trains all the same)"
+)]
+pub(super) struct OtherLoop {
+    pub(super) vehicle: String,
+    pub(super) found: Disagreement,
 }
 
 /// Whether the arguments leave open how a log is meant.

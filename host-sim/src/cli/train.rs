@@ -30,7 +30,6 @@ use impromptu_training::{
 use serde::Serialize;
 
 use movement::check_movement;
-pub(super) use vehicle::OtherLoop;
 use vehicle::compared;
 
 use super::{

@@ -51,7 +51,7 @@ fn every_command_has_its_page_of_the_manual() {
         assert!(pages.contains(&format!("manual/host-sim-{name}.1")), "{name}: {pages:?}");
     }
     let page = String::from_utf8(folder.read("manual/host-sim-study-lti.1")).unwrap();
-    assert!(page.contains(".TH HOST\\-SIM\\-STUDY\\-LTI") && page.contains("host\\-sim\\-study\\-lti"), "{page}");
+    assert!(page.contains(".TH HOST-SIM-STUDY-LTI") && page.contains("host\\-sim\\-study\\-lti"), "{page}");
 }
 
 #[test]

@@ -42,6 +42,7 @@ without it on models of the loop that the logs leave possible. Without dither th
 Any other loop: describe it (`host-sim describe --log X.csv` drafts the file), then `train --loop`.
 
 Examples:
+  host-sim machine servo --out servo && host-sim train --loop servo/servo.toml --log servo/*.csv --delay-ms 5 --out models
   host-sim train --log logs/*.csv --dithered dithered/*.csv --vehicle crazyflie --condition lab --out models
   host-sim train --log monday.csv tuesday.csv --delay-ms 30 --smoothing-ms 60 --name mine --out models
   host-sim train --loop gantry.toml --log gantry-*.csv --axis x --out models

@@ -2,25 +2,10 @@
 
 use anyhow::Result;
 use impromptu_sim::{flight_log::FlightLog, flights::Loop};
-use impromptu_training::{
-    agreement::{Disagreement, agreement},
-    breakdown::sound,
-    observer::Observer as _,
-};
+use impromptu_training::{agreement::agreement, breakdown::sound, observer::Observer as _};
 
 use super::Train;
-use crate::cli::Invocation;
-
-/// The simulated loop is not that of the logs.
-#[derive(Debug, thiserror::Error)]
-#[error(
-    "--vehicle {vehicle}: {found}; leave --vehicle out, and both lanes are chosen on what the logs alone leave possible, or give \
-     the vehicle, --gains, --controller and --condition that were flown (--force trains all the same)"
-)]
-pub(in crate::cli) struct OtherLoop {
-    vehicle: String,
-    found: Disagreement,
-}
+use crate::cli::{Invocation, log_reading::OtherLoop};
 
 /// Refuses a simulated loop that is not that of the logs, or says what --force overrides.
 pub(super) fn compared(
