@@ -85,6 +85,7 @@ impl<'a, const C: usize, const O: usize, const A: usize> Model<'a, C, O, A> {
     ///
     /// # Errors
     /// As [`Model::from_bytes`].
+    #[inline]
     pub fn load_into<'p>(place: &'p mut Self, bytes: &'a [u8], scratch: &mut Scratch) -> Result<&'p Self, Refusal> {
         if let Err(refusal) = place.load(bytes, scratch) {
             (place.network, place.feedback) = (None, None);

@@ -3,9 +3,12 @@
 //! *in* words of f32 bits; *out* the same of the next layer; *never* another order of operations than the kernel's; *source*
 //! [`super::kernel`].
 
-use super::kernel;
+use super::{
+    kernel,
+    shape::{ROWS, padded},
+};
 use crate::format::{
-    Activation, Blob, LayerLayout, Refusal, Section,
+    Activation, Blob, LayerLayout, MAX_OUTPUTS, Refusal, Section,
     ranges::{LAYER_ROWS, Range, SKIP_ROWS},
 };
 
@@ -55,9 +58,26 @@ impl<'a> Layer<'a> {
         }
     }
 
-    /// Writes the outputs of the skip, which has at most this many rows.
+    /// Writes the outputs of the skip.
     #[inline(never)]
-    pub(super) fn outputs<const N: usize>(&self, inputs: &[u32], result: &mut [f32]) {
+    pub(super) fn outputs(&self, inputs: &[u32], result: &mut [f32]) {
+        if result.len() > ROWS {
+            self.more_outputs(inputs, result);
+        } else {
+            self.rows::<ROWS>(inputs, result);
+        }
+    }
+
+    /// Of a skip with more rows than a block. Apart from what a small network needs of the stack.
+    #[cold]
+    #[inline(never)]
+    fn more_outputs(&self, inputs: &[u32], result: &mut [f32]) {
+        self.rows::<{ padded(MAX_OUTPUTS) }>(inputs, result);
+    }
+
+    /// The outputs of a skip with at most this many rows.
+    #[inline(always)]
+    fn rows<const N: usize>(&self, inputs: &[u32], result: &mut [f32]) {
         let mut outputs = [0; N];
         // It is linear.
         self.kernel.run(inputs, &mut outputs);

@@ -31,9 +31,6 @@ pub use scratch::{MAX_SCRATCH, Scratch};
 pub use shape::{INPUT_PADDING, ROWS, padded};
 pub use tanh::{TANH_CODE_ERROR, TANH_ERROR, TANH_INPUT_ONE, tanh, tanh_code};
 
-/// Rows of a layer with the most outputs that a model can have.
-const MAX_ROWS: usize = padded(MAX_OUTPUTS);
-
 // Only where floats have no assembly: there is no heap for the larger variant.
 #[allow(clippy::large_enum_variant, reason = "without a heap")]
 #[derive(Debug)]
@@ -226,16 +223,13 @@ impl<'a> Network<'a> {
         // The rows behind the last output are padding.
         let count = self.output_scale.len().min(outputs.len());
         if let (Some(skip), Some(outputs)) = (&self.skip, outputs.get_mut(..count)) {
-            if count > ROWS {
-                skip.outputs::<MAX_ROWS>(normalised, outputs);
-            } else {
-                skip.outputs::<ROWS>(normalised, outputs);
-            }
+            skip.outputs(normalised, outputs);
         }
     }
 
     /// [`Network::denormalise`] of integer layers with more outputs than a block has rows. Apart from what a small network needs
     /// of the stack.
+    #[cold]
     #[inline(never)]
     fn denormalise_blocks(&self, sums: &[u32], layers: &[integer::Layer<'_>], outputs: &mut [f32]) {
         let values = sums.chunks(ROWS).zip(integer::blocks_of_scales(layers)).flat_map(|(sums, scales)| scaled(sums, scales));

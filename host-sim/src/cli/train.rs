@@ -219,7 +219,8 @@ impl Train {
         }
         let mut gates = self.pass_gates(invocation, &logs, origin.delay_s, seed)?;
         if let Some(closed_loop) = &origin.closed_loop {
-            let differs = compared(self, invocation, closed_loop, &[&logs, &dithered])?;
+            let differs =
+                compared(self.vehicle.as_deref().unwrap_or_default(), self.force, invocation, closed_loop, &[&logs, &dithered])?;
             gates.overridden =
                 Vec::from_iter(gates.overridden.into_iter().chain(differs)).into_iter().reduce(|a, b| a + "; " + &b);
         }
@@ -261,7 +262,7 @@ impl Train {
             [] => dithered_logs(&recipe.lane, closed_loop, derived(seed, Purpose::Identification))?,
             paths => {
                 let logs = read(paths, closed_loop.rate_hz())?;
-                differs = compared(self, invocation, closed_loop, &[&logs])?;
+                differs = compared(self.vehicle.as_deref().unwrap_or_default(), self.force, invocation, closed_loop, &[&logs])?;
                 logs
             }
         };

@@ -4,12 +4,12 @@ use anyhow::Result;
 use impromptu_sim::{flight_log::FlightLog, flights::Loop};
 use impromptu_training::{agreement::agreement, breakdown::sound, observer::Observer as _};
 
-use super::Train;
 use crate::cli::{Invocation, log_reading::OtherLoop};
 
 /// Refuses a simulated loop that is not that of the logs, or says what --force overrides.
 pub(super) fn compared(
-    arguments: &Train,
+    vehicle: &str,
+    force: bool,
     invocation: &Invocation,
     closed_loop: &Loop,
     logs: &[&[FlightLog]],
@@ -19,13 +19,12 @@ pub(super) fn compared(
         let (sound, _) = sound(logs);
         let found = if sound.is_empty() { None } else { agreement(closed_loop, &sound)?.disagreement(closed_loop) };
         match found {
-            Some(found) if arguments.force => {
+            Some(found) if force => {
                 let overridden = format!("--vehicle overridden by --force: {found}");
                 invocation.console.note(&format!("warning: {overridden}"));
                 return Ok(Some(overridden));
             }
             Some(found) => {
-                let vehicle = arguments.vehicle.as_deref().unwrap_or_default();
                 return Err(anyhow::Error::new(OtherLoop { vehicle: vehicle.into(), found }));
             }
             None => {}
